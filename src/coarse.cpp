@@ -99,7 +99,7 @@ CoarseStart find_coarse_start(const CoarseModel& coarse, const SlidingPoint& fin
   coarse_scene.cycle.tolerance = std::max(chosen.tolerance, tolerance);
   ProgramOptions coarse_options = options;
   coarse_options.cycle.shooting.multipliers = 0;
-  const WithoutCheckpoints of_fine_mesh;
+  const Finally end = without_checkpoints(); // of the fine mesh
   const SlidingPoint point = find_point(coarse.model, coarse_scene, coarse_options, within_a_stage);
   const LimitCycle cycle = find_cycle(point, coarse_scene, coarse_options);
   CoarseStart start{cycle.outcome, coarse.model.dofs.size, coarse.model.interface.pairs};

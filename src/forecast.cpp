@@ -4,20 +4,16 @@
 /// 8.9).
 #include "squeal/forecast.hpp"
 
-#include "squeal/algebra/factor_forecast.hpp"
+#include "squeal/algebra/bordered_factor.hpp"
+#include "squeal/base/available_memory.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "squeal/point.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <Eigen/Core>
-#include <fstream>
 #include <functional>
 #include <numeric>
-#include <sys/mman.h>
-#include <sys/resource.h>
 
 namespace squeal
 {
@@ -25,10 +21,11 @@ namespace squeal
 namespace
 {
 
-constexpr double usual_periods = 50;        // of shooting from the estimate to a cycle
-constexpr int usual_steps = 128;            // a period, where they are chosen
-constexpr double seconds_of_calls = 2.5e-5; // a step of a model of one mass, which is all calls
-constexpr double day = 86400;               // [s]
+constexpr double usual_periods = 50;                               // of shooting from the estimate to a cycle
+constexpr int usual_steps = 128;                                   // a period, where they are chosen
+constexpr double seconds_of_calls = 2.5e-5;                        // a step of a model of one mass, which is all calls
+constexpr double operations_a_second = 3e10, bytes_a_second = 8e9; // of a usual core while all work
+constexpr double day = 86400;                                      // [s]
 constexpr double dense_copies = 24; // of n x n numbers in a dense quadratic problem: a pencil of size 2 n, six times
 // A slice takes about 100 pairs with their guards, and passes append two directions a pair. So V has 300 columns on
 // the brake; with its products, a copy while it grows, shapes, residuals and three right sides of a solve:
@@ -37,7 +34,6 @@ constexpr double vectors_of_modes_kept = 200; // of the same 100 pairs
 constexpr double vectors_of_shooting = 100;   // pairs of differences, work of a step, columns of the multipliers
 // A basis grows beyond its limit by what one pass adds; with it its copy while it grows, and the random vectors:
 constexpr double passes_of_response = 40;
-constexpr double start_of_libraries = 400e6; // [byte] OpenBLAS's buffer of 128 MB, those of MPI and of PETSc
 
 double steps_of_transient(const TransientSettings& transient)
 {
@@ -76,42 +72,10 @@ double steps_of(const Scene& scene, const ProgramOptions& options)
   return steps + of_scene + motions * (cycle + a_period * scene.cycle.free_periods);
 }
 
-/// The resident memory of this process [bytes]; 0 where the system does not say.
-double resident_memory()
-{
-  std::ifstream status("/proc/self/status");
-  double kilobytes = 0;
-  for (std::string word; status >> word;)
-    if (word == "VmRSS:" && status >> kilobytes) return 1024 * kilobytes;
-  return 0;
-}
-
 double sum_of_ranks(double value, MPI_Comm comm)
 {
   MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_DOUBLE, MPI_SUM, comm);
   return value;
-}
-
-/// Whether this process may take so many more bytes of addresses; the limit is that of ulimit -v.
-bool can_take(double bytes)
-{
-  rlimit limit{};
-  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return true;
-  if (bytes > static_cast<double>(limit.rlim_cur)) return false;
-  const auto size = static_cast<std::size_t>(bytes);
-  void* place = mmap(nullptr, size, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-  if (place == MAP_FAILED) return false;
-  munmap(place, size);
-  return true;
-}
-
-std::string limit_text(double bytes)
-{
-  rlimit limit{};
-  getrlimit(RLIMIT_AS, &limit);
-  return format("it may take %.3g MB of addresses (ulimit -v %llu), and %.3g MB beyond what it has are needed",
-                1e-6 * static_cast<double>(limit.rlim_cur), static_cast<unsigned long long>(limit.rlim_cur / 1024),
-                1e-6 * bytes);
 }
 
 std::string duration(double seconds)
@@ -121,11 +85,6 @@ std::string duration(double seconds)
   if (seconds < 2 * day) return format("%.2g hours", seconds / 3600);
   return seconds < 1000 * day ? format("%.3g days", seconds / day) : format("%.3g years", seconds / (365.25 * day));
 }
-
-} // namespace
-
-namespace
-{
 
 constexpr double number = sizeof(double);                               // [bytes]
 constexpr double matrix_entry = sizeof(PetscScalar) + sizeof(PetscInt); // in PETSc's rows
@@ -239,37 +198,6 @@ double memory_of_points(double points)
   return number * numbers_of_point * points;
 }
 
-Speed measured_speed(MPI_Comm comm)
-{
-  constexpr Eigen::Index size = 512, numbers = 8 << 20; // 64 MB, more than a cache
-  const Eigen::MatrixXd A = Eigen::MatrixXd::Ones(size, size);
-  const Eigen::VectorXd x = Eigen::VectorXd::Ones(numbers);
-  Eigen::MatrixXd product(size, size);
-  std::array<double, 2> times{HUGE_VAL, HUGE_VAL};
-  double sum = 0; // used, so that it is not left out
-  for (int pass = 0; pass < 4; ++pass)
-  {
-    MPI_Barrier(comm);
-    const double start = MPI_Wtime();
-    product.noalias() = A * A;
-    const double middle = MPI_Wtime();
-    sum += x.sum();
-    times[0] = std::min(times[0], middle - start);
-    times[1] = std::min(times[1], MPI_Wtime() - middle);
-  }
-  if (!(sum + product(0, 0) > 0)) return {};
-  MPI_Allreduce(MPI_IN_PLACE, times.data(), 2, MPI_DOUBLE, MPI_MAX, comm);
-  return {2. * size * size * size / times[0], number * static_cast<double>(numbers) / times[1]};
-}
-
-/// The least that a limit of the process may be.
-struct LeastLimit
-{
-  decltype(RLIMIT_STACK) resource;
-  rlim_t value, unit; // the shell's
-  const char* set_by;
-};
-
 } // namespace
 
 double Forecast::bytes() const
@@ -279,7 +207,7 @@ double Forecast::bytes() const
   return most;
 }
 
-Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOptions& options, SpeedTaken taken)
+Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOptions& options)
 {
   Forecast forecast;
   const Sizes sizes = sizes_of(model, options.factor);
@@ -288,9 +216,7 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   forecast.factor = sizes.factor.kind;
   forecast.factor_share = sizes.factor.bytes / sizes.ranks;
   forecast.factor_limit = 1e9 * options.factor.share_limit();
-  forecast.held = sum_of_ranks(resident_memory(), comm);
-  if (taken == SpeedTaken::measured) forecast.speed = measured_speed(comm);
-  const Speed& speed = forecast.speed;
+  forecast.held = sum_of_ranks(memory_entry("/proc/self/status", "VmRSS:").value_or(0), comm);
   const double free = free_memory(comm);
   const bool in_factor = stays_in_factor(sizes, free);
   const bool whole_operator = scene.cycle.enabled || (!in_factor && !shares_operator(sizes)); // tangents need one
@@ -298,8 +224,8 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
       std::max(whole_operator ? sizes.condensed_operator() : 0, 4 * number * sizes.pairs * sizes.pairs);
   // two products a step, each of which reads half of W, or the rows of E twice
   const double contact = in_factor ? 4 * number * sizes.factor.border_entries : sizes.condensed_operator();
-  forecast.step_seconds = seconds_of_calls + (sizes.factor.bytes + contact) / sizes.ranks / speed.bytes;
-  forecast.factor_seconds = sizes.factor.operations / speed.operations;
+  forecast.step_seconds = seconds_of_calls + (sizes.factor.bytes + contact) / sizes.ranks / bytes_a_second;
+  forecast.factor_seconds = sizes.factor.operations / operations_a_second;
   const auto add = [&](Stage stage, double bytes) { forecast.stages.push_back({stage, forecast.held + bytes}); };
   add(Stage::equilibrium, memory_of_equilibrium(sizes));
   if (seeks_modes(scene)) add(Stage::modes, memory_of_modes(sizes, scene.modes, options.modes, comm));
@@ -334,8 +260,8 @@ std::string text_of(const Forecast& forecast)
   text += format("; at most %.3g MB, with up to 120 modes\n", 1e-6 * forecast.bytes());
   if (forecast.several_ranks)
     text += format("  of what follows the model, %.3g MB on rank 0 alone\n", 1e-6 * forecast.on_rank_zero);
-  text += format("  time forecast, by %.2g Gflop/s and %.2g GB/s a rank: a factor %s", 1e-9 * forecast.speed.operations,
-                 1e-9 * forecast.speed.bytes, duration(forecast.factor_seconds).c_str());
+  text += format("  time forecast, by %.2g Gflop/s and %.2g GB/s a rank: a factor %s", 1e-9 * operations_a_second,
+                 1e-9 * bytes_a_second, duration(forecast.factor_seconds).c_str());
   if (forecast.steps > 0)
     text += format("; about %.3g time steps of %.2g s, %s", forecast.steps, forecast.step_seconds,
                    duration(forecast.seconds_of_steps()).c_str());
@@ -350,29 +276,11 @@ std::string problem_of(const Forecast& forecast, MPI_Comm comm)
   if (more > available)
     problem = format("the run would take about %.3g GB of memory beyond what the model has, and %.3g GB are free",
                      1e-9 * more, 1e-9 * available);
-  else if (const double share = std::max(forecast.on_rank_zero, more / ranks_of(comm));
-           rank_of(comm) == 0 && !can_take(share))
-    problem = "memory: " + limit_text(share);
   else if (forecast.seconds_of_steps() > day)
     problem = format("the run would make about %.3g time steps of %.2g s, which take %s", forecast.steps,
                      forecast.step_seconds, duration(forecast.seconds_of_steps()).c_str());
   if (!problem.empty()) problem += ": take a smaller model, fewer steps or a larger machine, or give --force to run it";
   return problem;
-}
-
-std::string problem_of_limits()
-{
-  // what Open MPI 4.1 was seen to start with: 28 files, 4 MB for the segments it shares, and a stack of 256 kB
-  constexpr std::array limits = {LeastLimit{RLIMIT_NOFILE, 28, 1, "ulimit -n"},
-                                 LeastLimit{RLIMIT_FSIZE, 4096, 1024, "ulimit -f"},
-                                 LeastLimit{RLIMIT_STACK, 256, 1024, "ulimit -s"}};
-  for (const LeastLimit& least : limits)
-    if (rlimit limit{}; getrlimit(least.resource, &limit) == 0 && limit.rlim_cur < least.value * least.unit)
-      return format("%s is %llu, and MPI needs %llu to start: raise the limit", least.set_by,
-                    static_cast<unsigned long long>(limit.rlim_cur / least.unit),
-                    static_cast<unsigned long long>(least.value));
-  if (can_take(start_of_libraries)) return {};
-  return "memory: " + limit_text(start_of_libraries) + " to start: raise the limit";
 }
 
 } // namespace squeal

@@ -143,7 +143,7 @@ std::string problem_of_written(const std::vector<std::string>& files, const Argu
   if (arguments.scene.empty()) return {};
   std::vector<std::filesystem::path> taken = {arguments.scene};
   const auto place = arguments.output.empty() ? default_output(arguments.scene) : arguments.output;
-  for (const char* name : result_file_names) taken.push_back(place / name);
+  for (const char* name : words_of<ResultFile>) taken.push_back(place / name);
   for (const std::string& file : files)
     if (std::ranges::any_of(taken, [&](const auto& other) { return is_same_file(file, other); }))
       return "the output " + shortened(file) + " of PETSc's would fall on the scene or a result: name another file";
@@ -248,13 +248,6 @@ void check_state_file(const std::string& key, const std::filesystem::path& file,
     throw Error(label + "it cannot be written; name a file where you may write");
 }
 
-/// Whether a launcher says that this is another rank than the first; known before MPI is up.
-bool is_other_rank()
-{
-  const std::string& rank = launched_rank();
-  return !rank.empty() && rank != "0";
-}
-
 /// The program, the ranks, the scene, the options and the contents of input files, by which checkpoints are
 /// distinguished from those of another run. Options of the session, about logs and memory, do not matter. Of one rank.
 std::string request_text(const Scene& scene, const std::vector<std::filesystem::path>& inputs, ProgramOptions options)
@@ -356,14 +349,6 @@ void print_error(int rank, const Error& error)
   if (rank == 0) std::fprintf(stderr, "squeal: error: %.3000s\n", error.what());
 }
 
-/// What keeps MPI and PETSc from starting; empty if nothing does.
-std::string problem_of_surroundings()
-{
-  std::error_code failed;
-  if (std::filesystem::current_path(failed).empty()) return "the working folder no longer exists: change to another";
-  return problem_of_limits();
-}
-
 /// Without a launcher Open MPI would start a daemon beside this process, for processes that it may start: a third of
 /// the time that a start takes. It would also make a folder inside one that all runs of a machine share, and that the
 /// last of them removes: in about one start of a thousand while another makes its own there, which fails. It takes
@@ -379,9 +364,9 @@ void stay_alone()
 
 int main(int argc, char** argv)
 {
-  if (const std::string problem = problem_of_surroundings(); !problem.empty())
+  if (std::error_code failed; std::filesystem::current_path(failed).empty()) // MPI would fail in a text of its own
   {
-    if (!is_other_rank()) std::fprintf(stderr, "squeal: error: %s\n", problem.c_str());
+    std::fprintf(stderr, "squeal: error: the working folder no longer exists: change to another\n");
     return 1;
   }
   Arguments arguments = take_arguments(argc, argv);

@@ -1,18 +1,16 @@
 #include "squeal/model.hpp"
 
 #include "squeal/base/constants.hpp"
+#include "squeal/base/petsc.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/base/shared.hpp"
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/ties.hpp"
-#include "squeal/solid/loads.hpp"
 #include "squeal/solid/matrix_rows.hpp"
-#include "squeal/solid/mesh_piece.hpp"
-#include "squeal/solid/probes.hpp"
+#include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <Eigen/Geometry>
 #include <utility>
 
 namespace squeal
@@ -59,18 +57,11 @@ std::vector<std::string> warnings_of(const Model& model, const Scene& scene)
 /// The longest edge of the box round all elements [m]. Points are where the scene puts them, whatever its mesh's unit.
 double length_of(const Mesh& mesh)
 {
-  Vec3 low, high;
-  low.fill(std::numeric_limits<double>::infinity());
-  high.fill(-std::numeric_limits<double>::infinity());
+  Eigen::AlignedBox3d box;
   for (const Element& element : mesh.elements)
     for (const int node : nodes_of(element))
-      for (std::size_t c = 0; c < 3; ++c)
-      {
-        const double x = mesh.nodes[static_cast<std::size_t>(node)][c];
-        low[c] = std::min(low[c], x);
-        high[c] = std::max(high[c], x);
-      }
-  return mesh.elements.empty() ? 0 : std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+      box.extend(Eigen::Vector3d(mesh.nodes[static_cast<std::size_t>(node)].data()));
+  return box.isEmpty() ? 0 : box.sizes().maxCoeff();
 }
 
 /// C += alpha M + beta K.

@@ -38,7 +38,7 @@ OptionList options_of(ProgramOptions& options)
   ShootingOptions& shooting = options.cycle.shooting;
   return {
       {"-factor", choice_of(options.factor.kind), Range::any,
-       "factorisation for the step and the equilibrium: supernodal, mumps (both on all ranks), dense (on rank 0)"},
+       "factorisation for the step and the equilibrium: supernodal or mumps, both on all ranks"},
       {"-factor_limit", &options.factor.limit, Range::any,
        "[GB] largest share of a rank in a supernodal factor; beyond it several ranks take MUMPS; -1: half of the free "
        "memory. Every run prints its choice, with what is foreseen"},
@@ -119,7 +119,7 @@ std::string option_page()
   for (const Option& option : options_of(standard))
   {
     std::string values;
-    for (const char* one : words_of(option)) values += (values.empty() ? "" : ", ") + markdown_code(one);
+    for (const char* one : choices_of(option)) values += (values.empty() ? "" : ", ") + markdown_code(one);
     text += markdown_row({markdown_code(option.name), markdown_code(value_of(option)), values, option.meaning});
   }
   return text;

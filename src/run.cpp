@@ -5,7 +5,6 @@
 #include "squeal/coarse.hpp"
 #include "squeal/forecast.hpp"
 #include "squeal/reduction/model_files.hpp"
-#include "squeal/scene/doubts.hpp"
 #include "squeal/studies.hpp"
 
 #include <algorithm>
@@ -26,7 +25,7 @@ std::string run_or_leave_out(Report& report, Stage which, MPI_Comm comm, const s
 {
   if (!report.ended_by.empty()) return "the run was ended " + report.ended_by + " before";
   const char* const name = word(which);
-  const LogStage log(name);
+  const Finally end = log_stage(name);
   if (rank_of(comm) == 0) std::printf("%s …\n", name), std::fflush(stdout);
   const double start = MPI_Wtime(), processor_start = processor_time();
   std::string left_out;
@@ -121,7 +120,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   print_model(report.model, comm);
   const std::optional<CoarseModel> coarse = check_starts(scene, model, comm);
   end_if_asked(comm);
-  const Forecast forecast = forecast_of(model, scene, options, SpeedTaken::usual);
+  const Forecast forecast = forecast_of(model, scene, options);
   if (rank_of(comm) == 0) std::printf("%s", factor_text(forecast).c_str());
   if (!options.force) agree(comm, problem_of(forecast, comm));
 
@@ -173,7 +172,7 @@ void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
     std::printf("# the scene, every default written out\n%s\n# the model\n", resolved_scene(scene).c_str());
   print_model(summary_with_doubts(model, scene, comm), comm);
   (void)check_starts(scene, model, comm);
-  const Forecast forecast = forecast_of(model, scene, options, SpeedTaken::measured);
+  const Forecast forecast = forecast_of(model, scene, options);
   if (rank_of(comm) == 0) std::printf("%s", text_of(forecast).c_str());
   const std::string problem = problem_of(forecast, comm);
   if (rank_of(comm) == 0 && !problem.empty()) std::printf("  WARNING: here %s\n", problem.c_str());

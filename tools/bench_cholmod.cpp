@@ -9,7 +9,7 @@
 #include "bench_timing.hpp"
 #include "bench_trajectories.hpp"
 #include "cholmod_handles.hpp"
-#include "squeal/algebra/factor_forecast.hpp"
+#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/options.hpp"
 #include "squeal/transient/transient.hpp"
 

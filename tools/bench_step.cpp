@@ -1,6 +1,5 @@
 /// Times the theta-step of a matrix folder, for tools/bench: one line of JSON on standard output.
 ///     bench_step FOLDER STATE h mu steps trajectories [dump]
-///     bench_step factors FOLDER h            the same matrix factored dense and sparse
 /// Trajectory k starts from STATE with its velocity scaled by 1 + k/1000. `dump`: the first trajectory's u and v after
 /// every step, raw doubles. Seconds are the processor's, of this rank, waiting included. Contact options as in squeal
 /// (-transient_…).
@@ -70,38 +69,8 @@ double plain_factor_entries(const Structure& structure, double h)
   return Factor(step_matrix(structure, h, 0.5), nullptr, FactorOptions{.kind = FactorKind::supernodal}).entries();
 }
 
-/// Seconds to factor A bordered by B with its condensed corner, and of one solve in two halves.
-std::pair<double, double> factor_times(Mat A, Mat B, FactorKind kind, Vec b, Vec x)
-{
-  Factor factor;
-  const double factoring = seconds(5,
-                                   [&]
-                                   {
-                                     factor = Factor(A, B, {.kind = kind});
-                                     (void)factor.condensed(1);
-                                   });
-  if (factor.failed()) throw Error("the matrix to be factored is not positive definite");
-  return {factoring, seconds(41, [&] { solve(factor, b, x); })};
-}
-
-void compare_factors(const std::filesystem::path& folder, double h)
-{
-  const Structure structure = read_structure(folder, PETSC_COMM_WORLD);
-  const Interface interface = read_interface(folder, structure, {0, true}, PETSC_COMM_WORLD);
-  const Owned<Mat> A = step_matrix(structure, h, 0.5);
-  const auto x = zeros_like(structure.load);
-  const auto [dense, dense_solve] = factor_times(A, interface.B, FactorKind::dense, structure.load, x);
-  const auto [sparse, sparse_solve] = factor_times(A, interface.B, FactorKind::supernodal, structure.load, x);
-  MatInfo info;
-  check(MatGetInfo(A, MAT_GLOBAL_SUM, &info));
-  std::printf("{\"entries\": %.0f, \"dense\": %.4g, \"dense_solve\": %.4g, \"sparse\": %.4g, \"sparse_solve\": "
-              "%.4g}\n",
-              info.nz_used, dense, dense_solve, sparse, sparse_solve);
-}
-
 void run(const std::vector<std::string>& words)
 {
-  if (words.at(0) == "factors") return compare_factors(words.at(1), std::stod(words.at(2)));
   const std::filesystem::path folder = words.at(0);
   const double h = std::stod(words.at(2)), mu = std::stod(words.at(3));
   const int steps = std::stoi(words.at(4)), count = std::stoi(words.at(5));

@@ -16,18 +16,6 @@ struct StageForecast
   double bytes = 0;
 };
 
-/// Of one rank while all work: operations of a matrix product [1/s], memory that is read [byte/s].
-struct Speed
-{
-  double operations = 3e10, bytes = 8e9; // of a usual core
-};
-
-enum class SpeedTaken
-{
-  usual,
-  measured, // by a product and by a sum of some milliseconds
-};
-
 /// For this number of ranks.
 struct Forecast
 {
@@ -40,14 +28,13 @@ struct Forecast
   bool several_ranks = false;
   FactorKind factor = FactorKind::automatic; // of K bordered by B, and what it takes of a rank [bytes]
   double factor_share = 0, factor_limit = 0; // limit: of a supernodal one
-  Speed speed;
 
   double bytes() const;
   double seconds_of_steps() const { return steps * step_seconds; }
 };
 
 /// Collective. Analyses K bordered by B and counts steps; solves nothing.
-Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOptions& options, SpeedTaken taken);
+Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOptions& options);
 
 /// How the matrices will be factored, in a line.
 std::string factor_text(const Forecast& forecast);
@@ -55,12 +42,8 @@ std::string factor_text(const Forecast& forecast);
 /// The forecast in a line each of the factor, memory and time.
 std::string text_of(const Forecast& forecast);
 
-/// Collective. Why the run is not started without --force: it would take more memory than the machine and this
-/// process's limits leave, or more than a day. Empty if it is.
+/// Collective. Why the run is not started without --force: it would take more memory than the machine leaves, or more
+/// than a day. Empty if it is.
 std::string problem_of(const Forecast& forecast, MPI_Comm comm);
-
-/// Which limit of this process leaves the libraries too little to start with; empty if none does. Needs no MPI. Below
-/// them, MPI fails in texts of its own, and OpenBLAS tries for ever to allocate its buffer.
-std::string problem_of_limits();
 
 } // namespace squeal

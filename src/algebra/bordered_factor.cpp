@@ -1,16 +1,12 @@
 #include "squeal/algebra/bordered_factor.hpp"
 
 #include "cholesky.hpp"
-#include "dense_factor.hpp"
 #include "mumps_factor.hpp"
-#include "squeal/algebra/factor_forecast.hpp"
-#include "squeal/algebra/large_pages.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
+#include "squeal/base/free_memory.hpp"
 
 #include <algorithm>
 #include <optional>
-#include <type_traits>
-#include <variant>
 
 namespace squeal
 {
@@ -19,13 +15,10 @@ struct Factor::Parts
 {
   MPI_Comm comm = MPI_COMM_NULL;
   int dofs = 0, border = 0;
-  RowLayout layout;                                                           // of the degrees of freedom
-  std::optional<Cholesky> cholesky{};                                         // takes and gives each rank's own rows
-  std::variant<std::monostate, MumpsFactor, DenseFactor> through_rank_zero{}; // DenseFactor on rank 0 only
-  bool failed = false;
-  std::vector<double>
-      right{};     // on rank 0, through which they pass: right-hand sides and then solutions, `dofs` long each
-  int columns = 0; // of the last forward
+  RowLayout layout;                   // of the degrees of freedom
+  std::optional<Cholesky> cholesky{}; // takes and gives each rank's own rows; else
+  std::optional<MumpsFactor> mumps{}; // through rank 0
+  std::vector<double> right{};        // there: right-hand sides and then solutions, `dofs` long each
 
   bool on_rank_zero() const { return rank_of(comm) == 0; }
   int own_rows() const { return layout.counts[static_cast<std::size_t>(rank_of(comm))]; }
@@ -34,10 +27,6 @@ struct Factor::Parts
 
 namespace
 {
-
-// Dense algebra is faster below this size and, above it, for a matrix with this share of entries (tools/bench factors).
-constexpr int dense_size = 500;
-constexpr double dense_fill = 0.1;
 
 /// B may be null.
 int rows_of(Mat B)
@@ -55,35 +44,19 @@ Triplets bordered(Mat A, Mat B)
   return entries;
 }
 
-bool is_small_or_full(Mat A, const Triplets& own)
-{
-  double entries = static_cast<double>(own.row.size()), size = rows_of(A);
-  MPI_Allreduce(MPI_IN_PLACE, &entries, 1, MPI_DOUBLE, MPI_SUM, comm_of(A));
-  return size <= dense_size || 2 * entries > dense_fill * size * size;
-}
-
 /// What will be factored, how and in which order.
 struct Plan
 {
   FactorKind kind;         // not automatic
-  Triplets entries;        // dense: all, on rank 0; else this rank's share
-  SymbolicFactor symbolic; // on rank 0, but for dense
+  Triplets entries;        // this rank's share
+  SymbolicFactor symbolic; // on rank 0
   double memory = 0;       // of a supernodal factor [bytes]
 };
 
 Plan make_plan(Mat A, Mat B, const FactorOptions& options)
 {
   const MPI_Comm comm = comm_of(A);
-  FactorKind kind = options.kind;
-  Triplets own = bordered(A, B);
-  if (kind == FactorKind::automatic && is_small_or_full(A, own)) kind = FactorKind::dense;
-  Plan plan{kind, {}, {}, 0};
-  if (kind == FactorKind::dense)
-  {
-    plan.entries = gather(std::move(own), TripletContent::values, comm);
-    return plan;
-  }
-  plan.entries = std::move(own);
+  Plan plan{options.kind, bordered(A, B), {}, 0};
   Triplets pattern;
   if (ranks_of(comm) > 1) pattern = gather(plan.entries, TripletContent::pattern, comm);
   const Triplets& all = ranks_of(comm) > 1 ? pattern : plan.entries;
@@ -93,7 +66,7 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
   MPI_Bcast(&plan.memory, 1, MPI_DOUBLE, 0, comm);
   constexpr double gigabyte = 1e9;
   const bool too_large = ranks_of(comm) > 1 && plan.memory / ranks_of(comm) > options.share_limit() * gigabyte;
-  if (kind == FactorKind::automatic) plan.kind = too_large ? FactorKind::mumps : FactorKind::supernodal;
+  if (options.kind == FactorKind::automatic) plan.kind = too_large ? FactorKind::mumps : FactorKind::supernodal;
   return plan;
 }
 
@@ -130,7 +103,6 @@ FactorForecast multifrontal_forecast(const SymbolicFactor& symbolic)
     symmetric += columns * (columns + inner);
     forecast.entries += columns * ((columns + 1) / 2 + inner);
     forecast.border_entries += columns * supernode.border;
-    forecast.inner_operations += operations_of(columns, inner);
     not_symmetric += columns * (columns + 2 * inner);
   }
   return forecast;
@@ -156,26 +128,6 @@ std::size_t strip_width(std::size_t size)
   return std::max(least, numbers / std::max<std::size_t>(1, size) / together * together);
 }
 
-/// Calls work(factor) with the factor that works through rank 0, if this rank holds one.
-template <class Result, class Parts, class Work> Result on_held_factor(Parts& parts, Work work)
-{
-  return std::visit(
-      [&](auto& factor) -> Result
-      {
-        if constexpr (std::is_same_v<std::remove_cvref_t<decltype(factor)>, std::monostate>)
-          return Result();
-        else
-          return work(factor);
-      },
-      parts.through_rank_zero);
-}
-
-/// Calls work(factor) with the factor that this rank holds, if it holds one.
-template <class Result, class Parts, class Work> Result with_factor(Parts& parts, Work work)
-{
-  return parts.cholesky ? work(*parts.cholesky) : on_held_factor<Result>(parts, work);
-}
-
 } // namespace
 
 Factor::Factor() = default;
@@ -192,23 +144,15 @@ Factor::Factor(Mat A, Mat B, const FactorOptions& options) : parts_(std::make_un
   parts.border = rows_of(B);
   Plan plan = make_plan(A, B, options);
   if (plan.kind == FactorKind::mumps)
-  {
-    parts.through_rank_zero.emplace<MumpsFactor>(
+    parts.mumps.emplace(
         BorderedEntries{std::move(plan.entries), plan.symbolic.position, parts.dofs, parts.border, parts.comm});
-  }
-  else if (plan.kind == FactorKind::supernodal)
-    parts.cholesky.emplace(std::move(plan.entries), std::move(plan.symbolic), parts.layout, parts.comm);
   else
-    on_rank_zero(parts.comm,
-                 [&] { parts.through_rank_zero.emplace<DenseFactor>(plan.entries, parts.dofs, parts.border); });
-  int failed = with_factor<bool>(parts, [](const auto& factor) { return factor.failed(); });
-  MPI_Bcast(&failed, 1, MPI_INT, 0, parts.comm);
-  parts.failed = failed;
+    parts.cholesky.emplace(std::move(plan.entries), std::move(plan.symbolic), parts.layout, parts.comm);
 }
 
 bool Factor::failed() const
 {
-  return parts_->failed;
+  return parts_->cholesky ? parts_->cholesky->failed() : parts_->mumps->failed();
 }
 
 std::vector<double> Factor::condensed(double scale) const
@@ -227,7 +171,7 @@ std::vector<double> Factor::condensed(double scale) const
         });
   }
   else
-    result = on_held_factor<std::vector<double>>(*parts_, [](auto& factor) { return factor.take_schur_complement(); });
+    result = parts_->mumps->take_schur_complement();
   if (parts_->on_rank_zero()) scale_and_mirror(result, parts_->border, scale);
   return result;
 }
@@ -235,8 +179,7 @@ std::vector<double> Factor::condensed(double scale) const
 void Factor::read_condensed(const std::function<void(const CondensedStrip&)>& take) const
 {
   if (const auto products = condensed_products()) return products->read(take);
-  const auto whole =
-      on_held_factor<std::vector<double>>(*parts_, [](auto& factor) { return factor.take_schur_complement(); });
+  const std::vector<double> whole = parts_->mumps->take_schur_complement();
   const auto n = static_cast<std::size_t>(parts_->border);
   if (parts_->on_rank_zero()) take({0, n, n, whole.data()});
 }
@@ -289,13 +232,11 @@ std::vector<double> Factor::forward(std::span<const Vec> b) const
     result = parts.cholesky->forward(own);
   else
   {
-    parts.columns = to_int(b.size());
     if (parts.on_rank_zero()) parts.right.resize(b.size() * static_cast<std::size_t>(parts.dofs));
     for (std::size_t k = 0; k < b.size(); ++k)
       MPI_Gatherv(own[k], parts.own_rows(), MPI_DOUBLE, parts.column(k), parts.layout.counts.data(),
                   parts.layout.starts.data(), MPI_DOUBLE, 0, parts.comm);
-    result = on_held_factor<std::vector<double>>(parts, [&](auto& factor)
-                                                 { return factor.forward(parts.right, parts.columns); });
+    result = parts.mumps->forward(parts.right, to_int(b.size()));
   }
   for (std::size_t k = 0; k < b.size(); ++k) check(VecRestoreArrayRead(b[k], &own[k]));
   return result;
@@ -310,7 +251,7 @@ void Factor::backward(const std::vector<double>& lambda, std::span<const Vec> x)
     parts.cholesky->backward(lambda, own);
   else
   {
-    on_held_factor<void>(parts, [&](auto& factor) { factor.backward(lambda, parts.right); });
+    parts.mumps->backward(lambda, parts.right);
     for (std::size_t k = 0; k < x.size(); ++k)
       MPI_Scatterv(parts.column(k), parts.layout.counts.data(), parts.layout.starts.data(), MPI_DOUBLE, own[k],
                    parts.own_rows(), MPI_DOUBLE, 0, parts.comm);
@@ -320,9 +261,7 @@ void Factor::backward(const std::vector<double>& lambda, std::span<const Vec> x)
 
 double Factor::entries() const
 {
-  double entries = with_factor<double>(*parts_, [](const auto& factor) { return factor.entries(); });
-  MPI_Bcast(&entries, 1, MPI_DOUBLE, 0, parts_->comm);
-  return entries;
+  return parts_->cholesky ? parts_->cholesky->entries() : parts_->mumps->entries();
 }
 
 std::shared_ptr<KnownAnalyses> no_analyses()
@@ -335,12 +274,6 @@ FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options)
   const int dofs = rows_of(A), border = rows_of(B);
   const MPI_Comm comm = comm_of(A);
   Plan plan = make_plan(A, B, options);
-  if (plan.kind == FactorKind::dense)
-  {
-    const double n = dofs, rows = n + border;
-    return {plan.kind,          sizeof(double) * n * rows, n * n, n * n, n * n / 2, 0, operations_of(n, border),
-            operations_of(n, 0)};
-  }
   FactorForecast forecast = multifrontal_forecast(plan.symbolic);
   MPI_Bcast(&forecast, sizeof forecast, MPI_BYTE, 0, comm);
   forecast.kind = plan.kind;

@@ -1,9 +1,9 @@
 #include "cholesky.hpp"
 
 #include "front.hpp"
-#include "squeal/algebra/large_pages.hpp"
 #include "squeal/algebra/panel.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
+#include "squeal/base/free_memory.hpp"
 
 #include <algorithm>
 #include <memory>

@@ -4,15 +4,36 @@
 ///     A = L L',   E = B L^-T,   B A^-1 B' = E E' (Schur complement),
 /// so that a solve has two halves, y = L^-1 b with E y = B A^-1 b, and x = L^-T (y - E' lambda). Each rank holds its
 /// share of the elimination tree (tree_share.hpp).
-#include "position_exchange.hpp"
 #include "squeal/algebra/bordered_factor.hpp"
 #include "tree_share.hpp"
+
+#include <petscsf.h>
 
 namespace squeal
 {
 
 struct Columns;
 struct Front;
+
+/// Right-hand sides and solutions between the ranks that own their rows and those that own their positions in a
+/// supernodal factor. The rows of shared supernodes stay where they are.
+class PositionExchange
+{
+public:
+  /// `position`: of each row; `owner`: of each position, empty on one rank.
+  PositionExchange(const RowLayout& layout, const std::vector<int>& position, const std::vector<int>& owner,
+                   MPI_Comm comm);
+
+  /// Puts b into x, `lanes` numbers a position: what this rank owns, and of shared positions its own rows. Collective.
+  void gather(std::span<const double* const> b, std::size_t lanes, std::vector<double>& x) const;
+
+  /// The reverse: the own rows from what the ranks own and what this rank has of shared positions. Collective.
+  void scatter(const std::vector<double>& x, std::size_t lanes, std::span<double* const> b) const;
+
+private:
+  std::vector<std::size_t> positions_; // that this rank fills
+  Owned<PetscSF> rows_;                // from the rows to these
+};
 
 class Cholesky
 {

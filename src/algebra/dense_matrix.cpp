@@ -1,6 +1,6 @@
 #include "squeal/algebra/dense_matrix.hpp"
 
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <Eigen/LU>
 #include <Eigen/QR>
@@ -9,7 +9,6 @@ namespace squeal
 {
 
 using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 MatrixXd dense_copy(Mat A)
 {
@@ -29,22 +28,6 @@ MatrixXd dense_copy(Mat A)
                });
   check(MatDestroySubMatrices(1, &parts));
   return result;
-}
-
-void broadcast(MatrixXd& A, MPI_Comm comm)
-{
-  Eigen::Index size[2] = {A.rows(), A.cols()};
-  MPI_Bcast(size, sizeof size, MPI_BYTE, 0, comm);
-  A.resize(size[0], size[1]);
-  MPI_Bcast(A.data(), to_int(A.size()), MPI_DOUBLE, 0, comm);
-}
-
-void broadcast(VectorXd& x, MPI_Comm comm)
-{
-  Eigen::Index size = x.size();
-  MPI_Bcast(&size, sizeof size, MPI_BYTE, 0, comm);
-  x.resize(size);
-  MPI_Bcast(x.data(), to_int(size), MPI_DOUBLE, 0, comm);
 }
 
 namespace

@@ -81,17 +81,15 @@ LentCores::~LentCores()
     std::this_thread::sleep_for(pause);
 }
 
-OneThread::OneThread()
+Finally one_thread()
 {
   const int before = threads_of_blas();
-  if (before <= 1) return;
-  threads_ = before;
-  set_threads(1);
-}
-
-OneThread::~OneThread()
-{
-  if (threads_ > 0) set_threads(threads_);
+  if (before > 1) set_threads(1);
+  return Finally(
+      [before]
+      {
+        if (before > 1) set_threads(before);
+      });
 }
 
 } // namespace squeal

@@ -1,9 +1,9 @@
 #include "squeal/algebra/multivector.hpp"
 
 #include "sparse_product.hpp"
-#include "splitmix.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
+#include "squeal/base/random.hpp"
 
 #include <algorithm>
 

@@ -1,12 +1,10 @@
 #include "squeal/algebra/paired_matrices.hpp"
 
+#include "registers.hpp"
 #include "sparse_product.hpp"
 #include "squeal/algebra/panel.hpp"
-#include "squeal/algebra/simd.hpp"
 
 #include <algorithm>
-#include <cstring>
-#include <numeric>
 
 namespace squeal
 {
@@ -15,8 +13,6 @@ namespace
 {
 
 using Two = double __attribute__((vector_size(16)));
-using Four = double __attribute__((vector_size(32)));
-using Eight = double __attribute__((vector_size(64))); // for AVX-512: without it GCC keeps arrays of these in memory
 
 /// y += A x for the upper triangles of symmetric matrices. With two parts an Entry belongs to one matrix, and a row of
 /// x holds v and then u of all trajectories, each in so many Vectors. With one part and an Entry of two numbers a row
@@ -136,49 +132,16 @@ std::vector<PetscInt> foreign_columns(const std::vector<Mat>& matrices)
   return columns;
 }
 
-std::vector<int> starts_of(const std::vector<int>& counts)
-{
-  std::vector<int> starts(counts.size(), 0);
-  std::partial_sum(counts.begin(), counts.end() - 1, starts.begin() + 1);
-  return starts;
-}
-
 /// The exchange that brings these rows of other ranks. Collective.
-RowExchange exchange_of(std::vector<PetscInt> wanted, const RowLayout& layout, MPI_Comm comm)
+Owned<PetscSF> exchange_of(const std::vector<PetscInt>& wanted, Mat A)
 {
-  RowExchange exchange;
-  exchange.receive_counts.assign(layout.counts.size(), 0);
-  exchange.send_counts = exchange.receive_counts;
-  for (PetscInt& row : wanted)
-  {
-    const auto above = std::upper_bound(layout.starts.begin(), layout.starts.end(), row); // of empty ranks the last
-    const auto rank = above - layout.starts.begin() - 1;
-    ++exchange.receive_counts[static_cast<std::size_t>(rank)];
-    row -= layout.starts[static_cast<std::size_t>(rank)];
-  }
-  MPI_Alltoall(exchange.receive_counts.data(), 1, MPI_INT, exchange.send_counts.data(), 1, MPI_INT, comm);
-  const std::vector<int> from = starts_of(exchange.receive_counts), to = starts_of(exchange.send_counts);
-  exchange.sent.resize(static_cast<std::size_t>(to.back() + exchange.send_counts.back()));
-  MPI_Alltoallv(wanted.data(), exchange.receive_counts.data(), from.data(), MPIU_INT, exchange.sent.data(),
-                exchange.send_counts.data(), to.data(), MPIU_INT, comm);
+  PetscLayout rows = nullptr;
+  check(MatGetLayouts(A, &rows, nullptr));
+  Owned<PetscSF> exchange;
+  check(PetscSFCreate(comm_of(A), exchange.put()));
+  check(PetscSFSetGraphLayout(exchange, rows, static_cast<PetscInt>(wanted.size()), nullptr, PETSC_COPY_VALUES,
+                              wanted.data()));
   return exchange;
-}
-
-/// The rows of x, `stride` numbers each, of other ranks. Collective.
-std::vector<double> rows_of_others(const RowExchange& exchange, const std::vector<double>& x, std::size_t stride,
-                                   MPI_Comm comm)
-{
-  const int width = static_cast<int>(stride);
-  std::vector<int> sent = exchange.send_counts, received = exchange.receive_counts;
-  for (std::vector<int>* counts : {&sent, &received})
-    for (int& count : *counts) count *= width;
-  const std::vector<int> to = starts_of(sent), from = starts_of(received);
-  std::vector<double> out(exchange.sent.size() * stride), in(static_cast<std::size_t>(from.back() + received.back()));
-  for (std::size_t i = 0; i < exchange.sent.size(); ++i)
-    std::copy_n(&x[static_cast<std::size_t>(exchange.sent[i]) * stride], stride, &out[i * stride]);
-  MPI_Alltoallv(out.data(), sent.data(), to.data(), MPI_DOUBLE, in.data(), received.data(), from.data(), MPI_DOUBLE,
-                comm);
-  return in;
 }
 
 /// Appends rows of two matrices side by side.
@@ -215,7 +178,7 @@ std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
   check(MatGetOwnershipRange(M, &first, &last));
   const std::vector<Mat> both = K ? std::vector{M, K} : std::vector{M};
   const std::vector<PetscInt> others = foreign_columns(both);
-  PairedMatrices matrices{comm_of(M), {}, {}, exchange_of(others, row_layout(M), comm_of(M))};
+  PairedMatrices matrices{comm_of(M), {}, {}, others.size(), exchange_of(others, M)};
   RowJoiner own(matrices.own, static_cast<std::size_t>(last - first)), foreign(matrices.foreign, others.size());
   const auto enter = [&](Mat A, PetscInt i, std::size_t which)
   {
@@ -254,7 +217,8 @@ void multiply(const PairedMatrices& matrices, std::size_t lanes, std::span<const
               std::span<const std::span<const Vec>> to, Add add, AddForeign add_others)
 {
   const std::size_t rows = matrices.own.starts.size() - 1, parts = from.size(), stride = parts * lanes;
-  std::vector<double> x(stride * rows), y;
+  std::vector<double> x(stride * rows), y, z(stride * matrices.received);
+  const RowType row(stride);
   for (std::size_t first = 0; first < from[0].size(); first += lanes)
   {
     const std::size_t count = std::min(lanes, from[0].size() - first);
@@ -271,7 +235,8 @@ void multiply(const PairedMatrices& matrices, std::size_t lanes, std::span<const
     add(matrices.own, x.data(), y.data());
     if (ranks_of(matrices.comm) > 1)
     {
-      const std::vector<double> z = rows_of_others(matrices.exchange, x, stride, matrices.comm);
+      check(PetscSFBcastBegin(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
+      check(PetscSFBcastEnd(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
       add_others(matrices.foreign, z.data(), y.data());
     }
     for (std::size_t i = 0; i < rows; ++i)

@@ -1,13 +1,13 @@
 #include "squeal/algebra/pencil_factor.hpp"
 
 #include "mumps.hpp"
-#include "squeal/algebra/factor_forecast.hpp"
 #include "squeal/base/broadcast.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 #include "symbolic_factor.hpp"
 
 #include <algorithm>
 #include <numeric>
+#include <petscsf.h>
 
 /// A factor of moderate size is made whole by every rank, each of which solves its part of the right-hand sides. Shared
 /// by ranks, MUMPS adds up in the order in which messages arrive: results would change in rounding from run to run, and
@@ -72,36 +72,26 @@ std::pair<Triplets, std::vector<double>> on_common_pattern(const Triplets& K, co
   return both;
 }
 
-/// Sends each row of a solution, with its number in front, to its owner.
+/// Sends each row of a solution to its owner.
 void bring_to_owners(const std::vector<MUMPS_INT>& places, const Eigen::MatrixXd& solution, const RowLayout& layout,
                      MPI_Comm comm, Eigen::MatrixXd& rows)
 {
-  const auto ranks = static_cast<std::size_t>(ranks_of(comm)), me = static_cast<std::size_t>(rank_of(comm));
-  const Eigen::Index columns = solution.cols();
-  std::vector<std::vector<double>> to(ranks);
-  for (std::size_t k = 0; k < places.size(); ++k)
+  std::vector<PetscSFNode> owners;
+  for (const MUMPS_INT place : places)
   {
-    const int row = to_int(places[k]) - 1;
-    const auto next = std::upper_bound(layout.starts.begin(), layout.starts.end(), row);
-    std::vector<double>& message = to[static_cast<std::size_t>(next - layout.starts.begin() - 1)];
-    message.push_back(row);
-    for (Eigen::Index j = 0; j < columns; ++j) message.push_back(solution(static_cast<Eigen::Index>(k), j));
+    const auto next = std::upper_bound(layout.starts.begin(), layout.starts.end(), to_int(place) - 1);
+    owners.push_back(
+        {static_cast<PetscInt>(next - layout.starts.begin() - 1), static_cast<PetscInt>(place - 1 - *(next - 1))});
   }
-  std::vector<double> out, in(static_cast<std::size_t>(layout.counts[me]) * static_cast<std::size_t>(1 + columns));
-  std::vector<int> sent, sent_from, received(ranks), received_to(ranks);
-  for (const std::vector<double>& message : to)
+  Owned<PetscSF> exchange;
+  check(PetscSFCreate(comm, exchange.put()));
+  check(PetscSFSetGraph(exchange, static_cast<PetscInt>(rows.rows()), static_cast<PetscInt>(owners.size()), nullptr,
+                        PETSC_COPY_VALUES, owners.data(), PETSC_COPY_VALUES));
+  for (Eigen::Index j = 0; j < solution.cols(); ++j)
   {
-    sent_from.push_back(to_int(out.size()));
-    sent.push_back(to_int(message.size()));
-    out.insert(out.end(), message.begin(), message.end());
+    check(PetscSFReduceBegin(exchange, MPI_DOUBLE, solution.col(j).data(), rows.col(j).data(), MPI_REPLACE));
+    check(PetscSFReduceEnd(exchange, MPI_DOUBLE, solution.col(j).data(), rows.col(j).data(), MPI_REPLACE));
   }
-  MPI_Alltoall(sent.data(), 1, MPI_INT, received.data(), 1, MPI_INT, comm);
-  std::exclusive_scan(received.begin(), received.end(), received_to.begin(), 0);
-  to = {};
-  MPI_Alltoallv(out.data(), sent.data(), sent_from.data(), MPI_DOUBLE, in.data(), received.data(), received_to.data(),
-                MPI_DOUBLE, comm);
-  for (auto entry = in.begin(); entry != in.end(); entry += columns + 1)
-    rows.row(static_cast<Eigen::Index>(*entry) - layout.starts[me]) = Eigen::RowVectorXd::Map(&*entry + 1, columns);
 }
 
 } // namespace
@@ -130,8 +120,8 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   parts.whole = is_made_whole(order.entries, symmetry, options, parts.comm);
   const auto entries_of = [&](Mat A)
   {
-    Triplets own;
-    symmetric ? append_lower_triangle(A, own) : append_rows(A, 0, own);
+    Triplets own = symmetric ? lower_triangle(A) : Triplets{};
+    if (!symmetric) append_rows(A, 0, own);
     return parts.whole ? everywhere(std::move(own), parts.comm) : own;
   };
   auto [entries, masses] = on_common_pattern(entries_of(K), entries_of(M));

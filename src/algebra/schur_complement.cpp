@@ -3,7 +3,7 @@
 /// its border rows give.
 #include "cholesky.hpp"
 #include "squeal/algebra/panel.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <algorithm>
 #include <petscblaslapack.h>

@@ -4,7 +4,7 @@
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/base/broadcast.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,8 @@
 #include "sparse_product.hpp"
 
-#include "squeal/algebra/simd.hpp"
+#include "registers.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <petscsf.h>
 
 namespace squeal
@@ -14,7 +13,6 @@ namespace
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Four = double __attribute__((vector_size(32)));
 
 constexpr std::size_t lanes = 16; // columns at once
 
@@ -91,22 +89,18 @@ SplitMatrix split(Mat A)
   return parts;
 }
 
-/// A row of x, `lanes` numbers.
-struct RowType
-{
-  MPI_Datatype type = MPI_DATATYPE_NULL;
-
-  RowType()
-  {
-    MPI_Type_contiguous(static_cast<int>(lanes), MPI_DOUBLE, &type);
-    MPI_Type_commit(&type);
-  }
-  ~RowType() { MPI_Type_free(&type); }
-  RowType(const RowType&) = delete;
-  RowType& operator=(const RowType&) = delete;
-};
-
 } // namespace
+
+RowType::RowType(std::size_t numbers)
+{
+  MPI_Type_contiguous(static_cast<int>(numbers), MPI_DOUBLE, &type);
+  MPI_Type_commit(&type);
+}
+
+RowType::~RowType()
+{
+  MPI_Type_free(&type);
+}
 
 bool is_sparse(Mat A)
 {
@@ -120,7 +114,7 @@ MatrixXd sparse_product(Mat A, const MatrixXd& X)
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, static_cast<int>(lanes), Eigen::RowMajor>;
   const SplitMatrix parts = split(A);
   const CompressedRows own(parts.own);
-  const RowType row;
+  const RowType row(lanes);
   MatrixXd Y(own.rows, X.cols());
   Rows x = Rows::Zero(X.rows(), lanes), y, received(parts.received, lanes);
   for (Index first = 0; first < X.cols(); first += static_cast<Index>(lanes))

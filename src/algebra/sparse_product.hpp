@@ -7,6 +7,17 @@
 namespace squeal
 {
 
+/// Neighbouring numbers as one entry of a message, for as long as it lives.
+struct RowType
+{
+  explicit RowType(std::size_t numbers);
+  RowType(const RowType&) = delete;
+  RowType& operator=(const RowType&) = delete;
+  ~RowType();
+
+  MPI_Datatype type = MPI_DATATYPE_NULL;
+};
+
 /// Whether A is stored by compressed rows (AIJ).
 bool is_sparse(Mat A);
 

@@ -1,12 +1,13 @@
 #include "symbolic_factor.hpp"
 
-#include "nested_dissection.hpp"
-#include "splitmix.hpp"
 #include "squeal/algebra/panel.hpp"
-#include "squeal/base/error.hpp"
+#include "squeal/base/random.hpp"
+#include "squeal/base/run_control.hpp"
 
 #include <algorithm>
+#include <metis.h>
 #include <numeric>
+#include <span>
 #include <unordered_map>
 #include <utility>
 
@@ -15,6 +16,36 @@ namespace squeal
 
 namespace
 {
+
+/// A graph in compressed form: the neighbours of each node, one list after the other.
+struct Graph
+{
+  std::vector<idx_t> offsets{0}, neighbours{};
+
+  int nodes() const { return static_cast<int>(offsets.size()) - 1; }
+  std::span<const idx_t> of(int node) const
+  {
+    return {neighbours.data() + offsets[at(node)], neighbours.data() + offsets[at(node + 1)]};
+  }
+};
+
+/// The position of each node in METIS's nested dissection (Karypis and Kumar 1998). Error: METIS finds no order.
+std::vector<idx_t> nested_dissection(Graph graph, std::vector<idx_t> weights)
+{
+  std::vector<idx_t> order(weights.size()), position(weights.size()), options(METIS_NOPTIONS);
+  METIS_SetDefaultOptions(options.data());
+  options[METIS_OPTION_COMPRESS] = 0; // the nodes are compressed
+  idx_t size = graph.nodes();
+  if (size == 0) return position;
+  graph.neighbours.reserve(1); // METIS takes no null pointer
+  const auto dissect = [&]
+  {
+    return METIS_NodeND(&size, graph.offsets.data(), graph.neighbours.data(), weights.data(), options.data(),
+                        order.data(), position.data());
+  };
+  if (without_losing_signals(METIS_OK, dissect) != METIS_OK) throw LibraryError("METIS found no elimination order");
+  return position;
+}
 
 /// The graph of (node, neighbour) pairs, each neighbour once and ascending; neighbours are less than `range`.
 Graph graph_of(int nodes, int range, const std::vector<std::pair<int, int>>& edges)
@@ -269,41 +300,25 @@ Edges edges_of(const Triplets& lower, int dofs, const Nodes& nodes)
   return edges;
 }
 
-/// What is ordered.
-struct Pattern
-{
-  Nodes nodes{};
-  std::vector<std::pair<int, int>> border{}; // as in Edges
-  Graph graph{};
-};
-
-Pattern pattern_of(const Triplets& lower, int dofs)
-{
-  Pattern pattern{nodes_of(lower, dofs)};
-  Edges edges = edges_of(lower, dofs, pattern.nodes);
-  const int nodes = pattern.nodes.count();
-  pattern.graph = graph_of(nodes, nodes, edges.inner);
-  pattern.border = std::move(edges.border);
-  return pattern;
-}
-
-/// `position`: of each node in an order of elimination.
-SymbolicFactor analyse_in_order(Pattern pattern, std::vector<idx_t> position, int dofs, int border)
+SymbolicFactor analysis_of(const Triplets& lower, int dofs, int border)
 {
   SymbolicFactor result;
   result.dofs = dofs;
   result.border = border;
-  auto& [nodes, to_rows, graph] = pattern;
+  const Nodes nodes = nodes_of(lower, dofs);
+  Edges edges = edges_of(lower, dofs, nodes);
+  Graph graph = graph_of(nodes.count(), nodes.count(), edges.inner);
+  std::vector<idx_t> position = nested_dissection(graph, nodes.sizes);
   std::vector<idx_t> ordered_sizes(position.size());
   const std::vector<idx_t> moved = postorder(elimination_tree(renumbered(graph, position)));
   for (idx_t& place : position) place = moved[at(place)];
   graph = renumbered(graph, position);
   for (std::size_t i = 0; i < position.size(); ++i) ordered_sizes[at(position[i])] = nodes.sizes[i];
-  for (auto& [node, row] : to_rows) node = position[at(node)];
+  for (auto& [node, row] : edges.border) node = position[at(node)];
 
   const std::vector<int> parent = elimination_tree(graph);
   const Weights weight{ordered_sizes};
-  const Graph to_border = graph_of(nodes.count(), border, to_rows);
+  const Graph to_border = graph_of(nodes.count(), border, edges.border);
   std::vector<int> starts(position.size() + 1, 0);
   std::partial_sum(ordered_sizes.begin(), ordered_sizes.end(), starts.begin() + 1);
   expand(amalgamate(fundamental_supernodes(graph, to_border, parent, weight), parent, weight), starts, result);
@@ -316,11 +331,8 @@ SymbolicFactor analyse_in_order(Pattern pattern, std::vector<idx_t> position, in
 
 SymbolicFactor analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm)
 {
-  Pattern pattern;
-  on_rank_zero(comm, [&] { pattern = pattern_of(lower, dofs); });
-  std::vector<idx_t> position = nested_dissection({pattern.graph, pattern.nodes.sizes}, comm);
   SymbolicFactor result;
-  on_rank_zero(comm, [&] { result = analyse_in_order(std::move(pattern), std::move(position), dofs, border); });
+  on_rank_zero(comm, [&] { result = analysis_of(lower, dofs, border); });
   return result;
 }
 

@@ -1,57 +1,32 @@
 #include "tree_share.hpp"
 
 #include "squeal/algebra/panel.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
+#include "squeal/base/packed.hpp"
 
 #include <algorithm>
 #include <limits>
-#include <queue>
 #include <utility>
 
 namespace squeal
 {
 
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Supernode, first, columns, below, border, rows_begin, values_begin, children)
+
 namespace
 {
 
-void broadcast(std::vector<int>& numbers, MPI_Comm comm)
-{
-  int count = to_int(numbers.size());
-  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
-  numbers.resize(at(count));
-  MPI_Bcast(numbers.data(), count, MPI_INT, 0, comm);
-}
-
 /// Gives every rank what rank 0 analysed.
-void broadcast(SymbolicFactor& symbolic, MPI_Comm comm)
+void broadcast_analysis(SymbolicFactor& symbolic, MPI_Comm comm)
 {
-  std::vector<int> numbers{symbolic.dofs, symbolic.border, to_int(symbolic.supernodes.size())};
-  for (const Supernode& supernode : symbolic.supernodes)
-  {
-    numbers.insert(numbers.end(), {supernode.first, supernode.columns, supernode.below, supernode.border,
-                                   to_int(supernode.children.size())});
-    numbers.insert(numbers.end(), supernode.children.begin(), supernode.children.end());
-  }
-  broadcast(numbers, comm);
+  std::array<int, 2> sizes{symbolic.dofs, symbolic.border};
+  MPI_Bcast(sizes.data(), 2, MPI_INT, 0, comm);
+  symbolic.dofs = sizes[0];
+  symbolic.border = sizes[1];
+  broadcast_packed(symbolic.supernodes, comm);
   broadcast(symbolic.position, comm);
   broadcast(symbolic.rows, comm);
   MPI_Bcast(&symbolic.entries, 1, MPI_DOUBLE, 0, comm);
-  auto next = numbers.begin();
-  const auto read = [&] { return *next++; };
-  symbolic.dofs = read();
-  symbolic.border = read();
-  symbolic.supernodes.resize(at(read()));
-  std::size_t rows = 0;
-  for (Supernode& supernode : symbolic.supernodes)
-  {
-    supernode.first = read();
-    supernode.columns = read();
-    supernode.below = read();
-    supernode.border = read();
-    supernode.children.resize(at(read()));
-    for (int& child : supernode.children) child = read();
-    supernode.rows_begin = std::exchange(rows, rows + at(supernode.below));
-  }
 }
 
 /// What a supernode costs [operations] to eliminate, with its part of the Schur complement. An entry costs a thousand
@@ -162,7 +137,7 @@ TreeShare share_tree(SymbolicFactor whole, MPI_Comm comm)
     share.symbolic = std::move(whole);
     return share;
   }
-  broadcast(whole, comm);
+  broadcast_analysis(whole, comm);
   const std::vector<int> owner = owners_of(whole, ranks);
   SymbolicFactor& mine = share.symbolic;
   mine.dofs = whole.dofs;

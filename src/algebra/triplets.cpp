@@ -1,6 +1,6 @@
 #include "triplets.hpp"
 
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 namespace squeal
 {
@@ -50,16 +50,11 @@ template <class T> std::vector<T> gather(const std::vector<T>& own, MPI_Datatype
 
 Triplets lower_triangle(Mat symmetric)
 {
-  Triplets entries;
-  append_lower_triangle(symmetric, entries);
-  return entries;
-}
-
-void append_lower_triangle(Mat symmetric, Triplets& entries)
-{
   constexpr double half = 0.52; // and the diagonal
+  Triplets entries;
   append(
       symmetric, 0, [](PetscInt i, PetscInt j) { return j <= i; }, half, entries);
+  return entries;
 }
 
 void append_rows(Mat B, PetscInt offset, Triplets& entries)

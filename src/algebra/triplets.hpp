@@ -24,9 +24,6 @@ enum class TripletContent
 /// This rank's share of the lower triangle, diagonal included.
 Triplets lower_triangle(Mat symmetric);
 
-/// Appends this rank's share of the lower triangle, diagonal included.
-void append_lower_triangle(Mat symmetric, Triplets& entries);
-
 /// Appends this rank's rows of B; its first row becomes row `offset` + 1.
 void append_rows(Mat B, PetscInt offset, Triplets& entries);
 

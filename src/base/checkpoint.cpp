@@ -115,11 +115,9 @@ void open_checkpoints(const CheckpointPlace& given)
                 file.string() + "): give those, or begin again without --restart");
 }
 
-WithoutCheckpoints::WithoutCheckpoints() : before_(std::exchange(place(), {})) {}
-
-WithoutCheckpoints::~WithoutCheckpoints()
+Finally without_checkpoints()
 {
-  place() = std::move(before_);
+  return Finally([before = std::exchange(place(), {})] { place() = before; });
 }
 
 void keep(const std::string& name, MPI_Comm comm, const Description& describe)

@@ -107,7 +107,7 @@ std::string value_of(const Option& option)
   return choice.words[choice.get(choice.member)];
 }
 
-Words words_of(const Option& option)
+Words choices_of(const Option& option)
 {
   const Choice* choice = std::get_if<Choice>(&option.member);
   return choice ? choice->words : Words{};

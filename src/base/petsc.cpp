@@ -1,14 +1,14 @@
 #include "squeal/base/petsc.hpp"
 
+#include "squeal/base/available_memory.hpp"
+
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
-#include <fstream>
 #include <string>
-#include <sys/resource.h>
 
 namespace squeal
 {
@@ -175,38 +175,24 @@ RowLayout row_layout(Mat A)
 
 double processor_time()
 {
-  timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
 double peak_memory(MPI_Comm comm)
 {
-  double bytes = 0;
-  std::ifstream status("/proc/self/status"); // getrusage counts the size of the parent process too
-  for (std::string word; status >> word;)
-    if (word == "VmHWM:" && status >> bytes) bytes *= 1024;
-  if (bytes == 0)
-  {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    bytes = 1024.0 * static_cast<double>(usage.ru_maxrss);
-  }
+  // getrusage counts the size of the parent process too
+  double bytes = memory_entry("/proc/self/status", "VmHWM:").value_or(0);
   MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_DOUBLE, MPI_SUM, comm);
   return bytes;
 }
 
-LogStage::LogStage(const char* name)
+Finally log_stage(const char* name)
 {
   PetscLogStage stage = -1;
   check(PetscLogStageGetId(name, &stage));
   if (stage < 0) check(PetscLogStageRegister(name, &stage));
   check(PetscLogStagePush(stage));
-}
-
-LogStage::~LogStage()
-{
-  (void)PetscLogStagePop();
+  return Finally([] { (void)PetscLogStagePop(); });
 }
 
 MPI_Comm comm_of(Vec x)

@@ -66,15 +66,6 @@ void note_signal(int number)
   signal_received = number;
 }
 
-void handle(int number, void (*handler)(int))
-{
-  struct sigaction action = {};
-  action.sa_handler = handler;
-  action.sa_flags = SA_RESTART;
-  sigemptyset(&action.sa_mask);
-  sigaction(number, &action, nullptr);
-}
-
 double seconds_since(Clock::time_point time)
 {
   return std::chrono::duration<double>(Clock::now() - time).count();
@@ -125,8 +116,8 @@ void end_with_launcher()
 void begin_run_control(const RunLimits& limits)
 {
   control().limits = limits;
-  for (const auto& [number, name] : ending_signals) handle(number, note_signal);
-  if (ignores_hangup) handle(SIGHUP, SIG_IGN);
+  for (const auto& [number, name] : ending_signals) std::signal(number, note_signal);
+  if (ignores_hangup) std::signal(SIGHUP, SIG_IGN);
 }
 
 void end_run_control()
@@ -146,24 +137,16 @@ bool end_is_asked(MPI_Comm comm)
   return own.ended_by != 0;
 }
 
-WorkOfPart::WorkOfPart(MPI_Comm part)
+Finally work_of_part(MPI_Comm part)
 {
   MPI_Comm_size(part, &control().together);
+  return Finally([] { control().together = 0; });
 }
 
-WorkOfPart::~WorkOfPart()
-{
-  control().together = 0;
-}
-
-Undisturbed::Undisturbed()
+Finally undisturbed()
 {
   control().undisturbed = true;
-}
-
-Undisturbed::~Undisturbed()
-{
-  control().undisturbed = false;
+  return Finally([] { control().undisturbed = false; });
 }
 
 int without_losing_signals(int success, const std::function<int()>& metis)

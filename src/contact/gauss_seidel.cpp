@@ -9,13 +9,12 @@
 #include "gauss_seidel.hpp"
 
 #include "squeal/base/broadcast.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
+#include "swept_pairs.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
-#include <numeric>
 #include <type_traits>
 
 namespace squeal
@@ -28,77 +27,6 @@ namespace
 // longer than to a tenth of its first defects would then be undone by what the others do to it.
 constexpr int most_of_a_patch = 8;
 constexpr double small_in_a_patch = 0.1;
-
-/// Patches that are swept side by side.
-struct Turn
-{
-  struct Part
-  {
-    std::size_t first, count; // of `order`
-  };
-  std::vector<std::size_t> order{}; // pairs, rank by rank
-  std::vector<Part> own{};          // patches of this rank
-  std::vector<int> counts{};        // pairs of each rank that shares them
-
-  std::span<const std::size_t> pairs(const Part& part) const
-  {
-    return std::span(order).subspan(part.first, part.count);
-  }
-};
-
-/// The pairs that sweeps visit, patch after patch. Of several patches each is swept by itself, and reactions act on the
-/// others at the end of a turn: when all have been swept, or the even or odd pieces of a single patch, which several
-/// ranks divide. So sweeps do not depend on the number of ranks, but for those of a single patch on one rank.
-struct SweptPairs
-{
-  std::vector<Turn> turns{};
-  bool several = false;          // patches, on all ranks
-  MPI_Comm comm = MPI_COMM_NULL; // ranks that sweep side by side
-
-  bool shared() const { return comm != MPI_COMM_NULL; }
-  bool by_pieces() const { return turns.size() > 1; }
-
-  /// work(pair) of all of this rank's.
-  template <class Work> void for_each_own(Work work) const
-  {
-    for (const Turn& turn : turns)
-      for (const Turn::Part& part : turn.own)
-        for (const std::size_t pair : turn.pairs(part)) work(pair);
-  }
-};
-
-SweptPairs one_patch(const ContactOperator& W)
-{
-  Turn all;
-  all.order.resize(W.pairs());
-  std::iota(all.order.begin(), all.order.end(), 0);
-  all.own = {{0, W.pairs()}};
-  return {{all}};
-}
-
-SweptPairs patches_of(const ContactOperator& W)
-{
-  SweptPairs where;
-  where.several = true;
-  if (W.shares_patches()) where.comm = W.shared_by();
-  const int ranks = where.shared() ? ranks_of(where.comm) : 1, me = where.shared() ? rank_of(where.comm) : 0;
-  where.turns.resize(W.patches_take_turns() ? 2 : 1);
-  for (std::size_t number = 0; number < where.turns.size(); ++number)
-    for (int rank = 0; rank < ranks; ++rank)
-    {
-      Turn& turn = where.turns[number];
-      const std::size_t before = turn.order.size();
-      for (std::size_t patch = number; patch < W.patches().size(); patch += where.turns.size())
-      {
-        if (W.owner(patch) != rank) continue;
-        const std::vector<std::size_t>& pairs = W.patches()[patch];
-        if (rank == me) turn.own.push_back({turn.order.size(), pairs.size()});
-        turn.order.insert(turn.order.end(), pairs.begin(), pairs.end());
-      }
-      turn.counts.push_back(to_int(turn.order.size() - before));
-    }
-  return where;
-}
 
 /// One problem while it is swept over. `Entry`: float for sweeps over the near field, double for sweeps over W.
 template <class Entry> struct SweptProblem
@@ -460,13 +388,6 @@ struct SweepStart
   std::vector<double> r, Wr;
 };
 
-std::vector<SweepStart> starts_of(std::span<ContactWork* const> works)
-{
-  std::vector<SweepStart> starts;
-  for (const ContactWork* work : works) starts.push_back({work->r, work->Wr});
-  return starts;
-}
-
 /// Where patches swept by themselves led away from the law, the next sweeps begin where these did.
 void begin_as_one(ContactWork& work, const SweepStart& start)
 {
@@ -506,7 +427,8 @@ void gauss_seidel(std::span<ContactWork* const> works, const ContactSettings& se
   };
   if (W.patches().size() > 1)
   {
-    const std::vector<SweepStart> starts = starts_of(left);
+    std::vector<SweepStart> starts;
+    for (const ContactWork* work : left) starts.push_back({work->r, work->Wr});
     const std::vector<ContactWork*> all = left;
     W.shares_patches() ? sweep_together(left, settings) : sweep_until_converged<float>(left, patches_of(W), settings);
     leave_open();

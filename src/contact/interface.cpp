@@ -1,6 +1,6 @@
 #include "squeal/contact/interface.hpp"
 
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 #include "squeal/solid/binary.hpp"
 #include "squeal/solid/sparse_rows.hpp"
 

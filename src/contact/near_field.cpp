@@ -2,7 +2,7 @@
 
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/disjoint_sets.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -3,11 +3,10 @@
 /// factor: each rank reads its part of the factor. Whole patches of the near field go to ranks, for sweeps.
 #include "gauss_seidel.hpp"
 #include "near_field.hpp"
-#include "squeal/algebra/large_pages.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/free_memory.hpp"
 #include "squeal/contact/contact_operator.hpp"
 
 #include <algorithm>

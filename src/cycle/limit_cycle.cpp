@@ -66,7 +66,7 @@ template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, con
                    {},
                    found.cut_short};
   cycle.free = std::move(found.free);
-  const Undisturbed last_period;
+  const Finally last_period = undisturbed();
   cycle.measured =
       measure_period(map, {problem.probes, options.samples}, cycle.orbit.period, cycle.orbit.state, nullptr);
   ++cycle.convergence.periods;

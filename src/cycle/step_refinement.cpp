@@ -409,7 +409,7 @@ LimitCycle measure_reduced_cycle(const CycleCorrection& correction, const Shooti
   cycle.theta = flow.map.theta;
   cycle.convergence = std::move(log.convergence);
   correction.fidelity.full_periods = cycle.convergence.periods;
-  const Undisturbed last_period;
+  const Finally last_period = undisturbed();
   cycle.measured = std::move(flow.measured);
   cycle.costs = {flow.map.step.factor_seconds, flow.map.step.condensed_seconds};
   return cycle;

@@ -4,7 +4,7 @@
 #include "held_stiffness.hpp"
 #include "squeal/algebra/lent_cores.hpp"
 #include "squeal/base/broadcast.hpp"
-#include "squeal/base/shared.hpp"
+#include "squeal/base/petsc.hpp"
 #include "squeal/contact/complementarity.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 

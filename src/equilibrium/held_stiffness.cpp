@@ -1,7 +1,7 @@
 #include "held_stiffness.hpp"
 
 #include "squeal/base/disjoint_sets.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <algorithm>
 #include <Eigen/Eigenvalues>

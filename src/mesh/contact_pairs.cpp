@@ -5,9 +5,8 @@
 #include "squeal/mesh/contact_pairs.hpp"
 
 #include "dual_rows.hpp"
-#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/mesh/names.hpp"
+#include "squeal/base/packed.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -244,14 +243,6 @@ void add_surface_pairs(const Mesh& mesh, const Scene& scene, int index, ContactP
   std::move(pairs.begin(), pairs.end(), std::back_inserter(result.pairs));
 }
 
-/// A pair without its nodes, as it is sent.
-struct SentPair
-{
-  int rotor_node, stator_node, node, contact, slave_nodes, nodes; // nodes: their number
-  Vec3 position, normal;
-  double area, gap;
-};
-
 } // namespace
 
 ContactPairs make_pairs(const Mesh& mesh, const Scene& scene)
@@ -277,38 +268,14 @@ ContactPairs make_pairs(const Mesh& mesh, const Scene& scene)
   return result;
 }
 
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PairNode, node, weight)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ContactPair, rotor_node, stator_node, node, position, normal, area, contact, gap,
+                                   nodes, slave_nodes)
+
 void broadcast_pairs(ContactPairs& contact, MPI_Comm comm)
 {
-  std::vector<SentPair> sent;
-  std::vector<PairNode> nodes;
-  for (const ContactPair& p : contact.pairs)
-  {
-    sent.push_back({p.rotor_node, p.stator_node, p.node, p.contact, p.slave_nodes, static_cast<int>(p.nodes.size()),
-                    p.position, p.normal, p.area, p.gap});
-    nodes.insert(nodes.end(), p.nodes.begin(), p.nodes.end());
-  }
-  broadcast(sent, comm);
-  broadcast(nodes, comm);
+  broadcast_packed(contact.pairs, comm);
   broadcast(contact.coverage, comm);
-  int rank = 0;
-  MPI_Comm_rank(comm, &rank);
-  if (rank == 0) return;
-  contact.pairs.clear();
-  auto first = nodes.cbegin();
-  for (const SentPair& s : sent)
-  {
-    contact.pairs.push_back({s.rotor_node,
-                             s.stator_node,
-                             s.node,
-                             s.position,
-                             s.normal,
-                             s.area,
-                             s.contact,
-                             s.gap,
-                             {first, first + s.nodes},
-                             s.slave_nodes});
-    first += s.nodes;
-  }
 }
 
 } // namespace squeal

@@ -1,7 +1,6 @@
 #include "dual_rows.hpp"
 
 #include "squeal/base/error.hpp"
-#include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>
@@ -246,13 +245,9 @@ ContactSurface contact_surface(const Mesh& mesh, const std::string& name, const 
     surface.placed.push_back({face.shape, position_matrix(x), {}, 0, face.of_shell});
   }
   set_normals(surface, set_patches(surface));
-  Eigen::Vector3d low = surface.placed.front().x.col(0), high = low;
-  for (const PlacedFace& face : surface.placed)
-  {
-    low = low.cwiseMin(face.x.rowwise().minCoeff());
-    high = high.cwiseMax(face.x.rowwise().maxCoeff());
-  }
-  surface.size = (high - low).norm();
+  std::vector<Vec3> places;
+  for (const int node : surface.nodes) places.push_back(mesh.nodes[node]);
+  surface.size = diagonal_of(places);
   return surface;
 }
 

@@ -1,11 +1,18 @@
 /// The mesh of a scene: from its file, with the scene's points and reference points.
+///
+/// A superelement's retained nodes are those of the mesh at the same places. Its modal coordinates are carried by nodes
+/// of its own, six a node.
 #include "squeal/mesh/mesh.hpp"
 
-#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/mesh/build.hpp"
-#include "squeal/mesh/names.hpp"
-#include "superelements.hpp"
+#include "squeal/base/packed.hpp"
+#include "squeal/mesh/mesh_file.hpp"
+#include "squeal/mesh/row_motions.hpp"
+
+#include <algorithm>
+#include <array>
+#include <Eigen/Geometry>
+#include <set>
 
 namespace squeal
 {
@@ -13,13 +20,20 @@ namespace squeal
 namespace
 {
 
-template <class T> void broadcast_lists(std::map<std::string, std::vector<T>>& lists, MPI_Comm comm)
+template <class Map> void add_keys(const Map& map, std::vector<std::string>& names)
 {
-  std::vector<char> names; // each terminated by a zero
-  for (const auto& [name, list] : lists) names.insert(names.end(), name.c_str(), name.c_str() + name.size() + 1);
-  broadcast(names, comm);
-  for (const char* name = names.data(); name < names.data() + names.size(); name += std::string(name).size() + 1)
-    broadcast(lists[name], comm);
+  for (const auto& [name, value] : map) names.push_back(name);
+}
+
+/// Nodes of a surface and of a volume of one name are those of the volume: a support would hold all of it.
+void check_one_meaning(const Mesh& mesh, const std::string& name, const std::string& user)
+{
+  constexpr std::array words = {"points", "curves", "surfaces", "volumes"};
+  const auto found = mesh.dimensions.find(name);
+  if (found == mesh.dimensions.end() || found->second.size() < 2) return;
+  const int lowest = found->second.front(), highest = found->second.back();
+  throw Error(user + ": \"" + name + "\" names " + words.at(static_cast<std::size_t>(lowest)) + " and " +
+              words.at(static_cast<std::size_t>(highest)) + " of the mesh: give each a name of its own");
 }
 
 Mesh read_file(const Scene& scene)
@@ -42,21 +56,70 @@ void add_point(const std::string& name, const Vec3& position, Mesh& mesh)
   mesh.nodes.push_back(position);
 }
 
-/// Throws Error if the scene names a point, group or surface that the mesh does not have.
-void check_names(const Mesh& mesh, const Scene& scene)
+/// The node of the mesh, among the candidates, where a retained node is.
+int joined_node(const Mesh& mesh, const std::set<int>& candidates, const PlacedNode& retained, const std::string& user)
 {
-  for (const RigidBody& body : scene.rigid_bodies)
-    for (const std::string& name : body.surfaces) named_faces(mesh, name, "rigid body '" + body.name + "'");
-  for (const Spring& spring : scene.springs)
-    for (const std::string& name : {spring.from, spring.to})
-      if (name != ground) point_node(mesh, name, "spring");
-  for (const Support& support : scene.supports) named_nodes(mesh, support.on, "support");
-  for (const Force& force : scene.forces) named_nodes(mesh, force.on, "force");
-  for (const Pressure& pressure : scene.pressures) named_faces(mesh, pressure.on, "pressure");
-  for (const Contact& contact : scene.contacts)
-    for (const std::string& name : {contact.rotor, contact.stator})
-      if (!mesh.points.count(name)) named_faces(mesh, name, "contact");
-  for (const Probe& probe : scene.probes) named_nodes(mesh, probe.on, "probe '" + probe.name + "'");
+  constexpr double coincident = 1e-6; // of the mesh's size: places in a mesh file have as many digits
+  const auto distance = [&](int node) { return norm(mesh.nodes[static_cast<std::size_t>(node)] - retained.at); };
+  const int nearest =
+      *std::min_element(candidates.begin(), candidates.end(), [&](int a, int b) { return distance(a) < distance(b); });
+  if (distance(nearest) > coincident * diagonal_of(mesh.nodes))
+    throw Error(
+        user + ": node " + std::to_string(retained.node) +
+        format(" at (%g, %g, %g) m meets no node: the nearest is %.3g m away; mesh the parts so that their nodes "
+               "coincide with the retained ones, or name the point or group that has them",
+               retained.at[0], retained.at[1], retained.at[2], distance(nearest)));
+  return nearest;
+}
+
+/// The node of the mesh for each retained node.
+std::map<long, int> joined_nodes(const Mesh& mesh, const Superelement& superelement,
+                                 const std::vector<PlacedNode>& placed, const std::vector<NodeMotion>& rows)
+{
+  const std::string user = "superelement " + superelement.name;
+  std::set<int> candidates, taken;
+  for (const std::string& name : superelement.on)
+    for (const int node : named_nodes(mesh, name, user)) candidates.insert(node);
+  if (candidates.empty()) throw Error(user + ": the groups that it is joined to have no nodes");
+  std::map<long, int> joined;
+  for (const NodeMotion& row : rows)
+  {
+    if (row.motion < 0 || joined.count(row.node)) continue;
+    const auto place = std::ranges::find(placed, row.node, &PlacedNode::node);
+    if (place == placed.end())
+      throw Error(user + ": nodes.txt has no line for node " + std::to_string(row.node) + " of dofs.txt");
+    const int node = joined_node(mesh, candidates, *place, user);
+    if (!taken.insert(node).second)
+      throw Error(user + ": two of its nodes, one of them " + std::to_string(row.node) + ", are at the same place");
+    joined[row.node] = node;
+  }
+  if (joined.empty()) throw Error(user + ": dofs.txt has no motion of a node, so there is nothing to join");
+  return joined;
+}
+
+/// Adds the scene's superelements to the mesh. Throws Error for a retained node that meets no node of the groups it is
+/// joined to, or one that is taken.
+void add_superelements(const Scene& scene, Mesh& mesh)
+{
+  for (const Superelement& superelement : scene.superelements)
+  {
+    const std::vector<NodeMotion> rows = read_row_motions(superelement.folder / "dofs.txt");
+    const std::vector<PlacedNode> placed = read_placed_nodes(superelement.folder / "nodes.txt");
+    const auto joined = joined_nodes(mesh, superelement, placed, rows);
+    std::vector<SuperelementRow> own;
+    int coordinates = 0;
+    for (const NodeMotion& row : rows)
+    {
+      if (row.motion >= 0)
+      {
+        own.push_back({joined.at(row.node), row.motion, false});
+        continue;
+      }
+      if (coordinates % 6 == 0) mesh.nodes.push_back(placed.front().at);
+      own.push_back({static_cast<int>(mesh.nodes.size()) - 1, coordinates++ % 6, true});
+    }
+    mesh.superelements.push_back(std::move(own));
+  }
 }
 
 } // namespace
@@ -71,26 +134,66 @@ Mesh read_mesh(const Scene& scene)
   for (const Point& point : scene.points) add_point(point.name, point.at, mesh);
   for (const RigidBody& body : scene.rigid_bodies) add_point(body.name, body.at, mesh);
   if (mesh.nodes.empty()) throw Error("the scene has neither a mesh nor points: nothing to compute");
-  check_names(mesh, scene);
+  for (const RigidBody& body : scene.rigid_bodies) // whose nodes are found by any group
+    for (const std::string& name : body.surfaces) (void)named_faces(mesh, name, "rigid body '" + body.name + "'");
   add_superelements(scene, mesh);
   return mesh;
 }
+
+double diagonal_of(const std::vector<Vec3>& nodes)
+{
+  Eigen::AlignedBox3d box;
+  for (const Vec3& node : nodes) box.extend(Eigen::Vector3d(node.data()));
+  return box.diagonal().norm();
+}
+
+int point_node(const Mesh& mesh, const std::string& name, const std::string& user)
+{
+  if (const auto point = mesh.points.find(name); point != mesh.points.end()) return point->second;
+  std::vector<std::string> known;
+  add_keys(mesh.points, known);
+  throw Error(user + ": there is no point or rigid body \"" + name + "\"" + spelling_hint(name, known));
+}
+
+std::vector<int> named_nodes(const Mesh& mesh, const std::string& name, const std::string& user)
+{
+  if (const auto point = mesh.points.find(name); point != mesh.points.end()) return {point->second};
+  if (const auto group = mesh.node_groups.find(name); group != mesh.node_groups.end())
+  {
+    check_one_meaning(mesh, name, user);
+    return group->second;
+  }
+  std::vector<std::string> known;
+  add_keys(mesh.points, known);
+  add_keys(mesh.node_groups, known);
+  throw Error(user + ": there is no point, rigid body or mesh group \"" + name + "\"" + spelling_hint(name, known));
+}
+
+const std::vector<Face>& named_faces(const Mesh& mesh, const std::string& name, const std::string& user)
+{
+  if (const auto surface = mesh.surfaces.find(name); surface != mesh.surfaces.end()) return surface->second;
+  std::vector<std::string> known;
+  add_keys(mesh.surfaces, known);
+  throw Error(user + " on \"" + name + "\": the mesh has no such surface" + spelling_hint(name, known));
+}
+
+std::string node_text(int node, const Vec3& position)
+{
+  return format("node %d at (%g, %g, %g)", node, position[0], position[1], position[2]);
+}
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Face, shape, nodes, of_shell)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SuperelementRow, node, motion, coordinate)
 
 void broadcast_mesh(Mesh& mesh, MPI_Comm comm)
 {
   broadcast(mesh.nodes, comm);
   broadcast(mesh.elements, comm);
-  broadcast_lists(mesh.surfaces, comm);
-  broadcast_lists(mesh.node_groups, comm);
-  broadcast_lists(mesh.dimensions, comm);
-  std::map<std::string, std::vector<int>> points;
-  for (const auto& [name, node] : mesh.points) points[name] = {node};
-  broadcast_lists(points, comm);
-  for (const auto& [name, node] : points) mesh.points[name] = node.front();
-  auto superelements = mesh.superelements.size();
-  MPI_Bcast(&superelements, sizeof superelements, MPI_BYTE, 0, comm);
-  mesh.superelements.resize(superelements);
-  for (std::vector<SuperelementRow>& rows : mesh.superelements) broadcast(rows, comm);
+  broadcast_packed(mesh.surfaces, comm);
+  broadcast_packed(mesh.node_groups, comm);
+  broadcast_packed(mesh.dimensions, comm);
+  broadcast_packed(mesh.points, comm);
+  broadcast_packed(mesh.superelements, comm);
 }
 
 } // namespace squeal

@@ -7,7 +7,6 @@
 
 #include "squeal/base/error.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/mesh/mesh_input.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 /// Files and parameters of geometries, and the first bytes of mesh files.
-#include "squeal/mesh/mesh_input.hpp"
+#include "squeal/mesh/mesh_file.hpp"
 
 #include "squeal/base/error.hpp"
 

@@ -3,7 +3,7 @@
 /// Graph: two nodes are neighbours when an element has both. The slave node of a contact pair and the master node of
 /// largest weight are merged into one vertex, so that both have the same owner. The weight of a vertex is the number of
 /// its nodal degrees of freedom.
-#include "squeal/mesh/partition.hpp"
+#include "squeal/mesh/contact_pairs.hpp"
 
 #include "squeal/base/disjoint_sets.hpp"
 #include "squeal/base/error.hpp"

@@ -3,7 +3,6 @@
 #include "dual_rows.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/location.hpp"
-#include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>

@@ -3,8 +3,8 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/quadratic_residual.hpp"
 #include "squeal/algebra/shift_invert.hpp"
-#include "squeal/base/callback.hpp"
 #include "squeal/base/constants.hpp"
+#include "squeal/base/petsc.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 

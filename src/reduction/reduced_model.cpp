@@ -2,7 +2,7 @@
 
 #include "reduction_basis.hpp"
 #include "squeal/base/free_memory.hpp"
-#include "squeal/solid/rayleigh.hpp"
+#include "squeal/solid/structure.hpp"
 
 #include <algorithm>
 #include <array>

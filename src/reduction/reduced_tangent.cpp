@@ -4,7 +4,7 @@
 #include "squeal/reduction/reduced_tangent.hpp"
 
 #include "squeal/algebra/dense_matrix.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 #include "squeal/contact/sliding_direction.hpp"
 
 #include <Eigen/LU>

@@ -3,7 +3,7 @@
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/constants.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 #include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>

@@ -5,7 +5,7 @@
 #include "files.hpp"
 #include "squeal/base/whole_file.hpp"
 #include "squeal/report/results_folder.hpp"
-#include "squeal/solid/probes.hpp"
+#include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -75,7 +75,7 @@ public:
   template <class Enum> Result& add(const std::string& name, const char* meaning, Enum value) const
   {
     Result& result = add(name, "word", meaning, word(value));
-    result.words = words_of(value);
+    result.words = words_of<Enum>;
     return result;
   }
 

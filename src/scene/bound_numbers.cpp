@@ -1,8 +1,8 @@
 /// Numbers of a scene, found by their keys through the tree of keys, and set as a file would set them.
 #include "bound_numbers.hpp"
 
-#include "read_values.hpp"
 #include "squeal/base/error.hpp"
+#include "toml_values.hpp"
 
 #include <algorithm>
 #include <charconv>

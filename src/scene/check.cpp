@@ -1,7 +1,6 @@
 /// Checks of a scene that involve several keys: tables that exclude each other, undefined or repeated names, numbers
 /// that contradict each other.
 #include "squeal/base/error.hpp"
-#include "squeal/scene/row_names.hpp"
 #include "toml_values.hpp"
 
 #include <algorithm>

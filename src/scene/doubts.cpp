@@ -3,7 +3,7 @@
 /// from 20 kg/m3 (foams) to 22 590 (osmium), Young's moduli from 1e4 Pa (gels) to 1.3e12 (diamond). Speeds of
 /// sound sqrt(E/rho) go from 10 m/s (soft rubber has 30) to 20 000 (diamond has 18 000). A grain of dust of 10 um
 /// weighs 1e-12 kg.
-#include "squeal/scene/doubts.hpp"
+#include "squeal/scene/scene.hpp"
 
 #include "squeal/base/error.hpp"
 

@@ -122,6 +122,19 @@ bool has_unit(const std::string& unit);
 /// Returns the keys of a scene file, its tables in the order in which they are written.
 SceneKeys keys_of(Scene& scene);
 
+/// Those of the tables of stages and studies.
+SceneKeys keys_of(ModesSettings& modes);
+SceneKeys keys_of(EstimateSettings& estimate);
+SceneKeys keys_of(TransientSettings& transient);
+SceneKeys keys_of(CycleSettings& cycle);
+SceneKeys keys_of(BranchSettings& branch);
+SceneKeys keys_of(SweepSettings& sweep);
+SceneKeys keys_of(SensitivitySettings& sensitivity);
+SceneKeys keys_of(Change& change);
+SceneKeys keys_of(ResponseSettings& response);
+SceneKeys keys_of(RobustnessSettings& robustness);
+SceneKeys keys_of(UncertainNumber& number);
+
 /// Places where values were given, for messages: "scene.toml, line 12" or "--set key=value".
 struct Places
 {

@@ -1,5 +1,5 @@
 /// The keys of the tables of stages and studies.
-#include "stage_keys.hpp"
+#include "scene_keys.hpp"
 
 namespace squeal
 {

@@ -6,7 +6,6 @@
 #include <charconv>
 #include <cmath>
 #include <sstream>
-#include <string_view>
 
 namespace squeal
 {
@@ -17,28 +16,6 @@ namespace
 /// The source name of an override; it tells overrides from values of the file.
 constexpr const char* override_prefix = "--set ";
 
-/// The most parts that a key in the line can have: names with single dots between them, before a comment.
-int most_parts(std::string_view line)
-{
-  constexpr std::string_view ends = ",=[]{}";
-  int most = 1, parts = 1;
-  char last = 0, quote = 0;
-  for (const char c : line)
-  {
-    if (quote == 0 && c == '#') break;
-    if (c == ' ' || c == '\t') continue;
-    if (c == quote)
-      quote = 0;
-    else if (quote == 0 && (c == '"' || c == '\''))
-      quote = c;
-    if (ends.find(c) != std::string_view::npos) parts = 1;
-    parts += c == '.' && last != '.';
-    most = std::max(most, parts);
-    last = c;
-  }
-  return most;
-}
-
 /// Returns "a.b=v" as the table { a = { b = v } }. A value that is not TOML is taken as a string.
 toml::table parse_override(const std::string& text)
 {
@@ -46,7 +23,6 @@ toml::table parse_override(const std::string& text)
   const std::string source = override_prefix + text;
   if (equals == std::string::npos || equals == 0)
     throw Error(source + ": expected KEY=VALUE, such as friction.coefficient=0.3");
-  refuse_deep_key(text, override_prefix + shortened(text));
   const std::string key = text.substr(0, equals) + " = ";
   const std::string value = text.substr(equals + 1);
   try
@@ -135,13 +111,6 @@ std::string text_of(const toml::parse_error& error)
 {
   const std::string text(error.description());
   return text.substr(0, text.find(" (TOML_"));
-}
-
-void refuse_deep_key(std::string_view line, const std::string& place)
-{
-  constexpr int deepest = 64; // parts
-  if (most_parts(line) > deepest)
-    throw Error(place + ": a key of more than " + std::to_string(deepest) + " parts: leave it out");
 }
 
 std::vector<std::string> words_of_key(const std::string& key)

@@ -28,15 +28,18 @@ std::string hint_or_list(const std::string& word, const std::vector<std::string>
 /// What the parser says, without the names of its own macros.
 std::string text_of(const toml::parse_error& error);
 
-/// Refuses a line of TOML with a key of more than 64 parts: toml++ makes a table in a table of each part, and its
-/// recursion ends the stack. A scene's keys have three.
-void refuse_deep_key(std::string_view line, const std::string& place);
-
 /// Applies "table.key=value" to the tables of a scene.
 void apply_override(toml::table& root, const std::string& text);
 
 /// The words of a key between its dots; a word in quotes may hold dots.
 std::vector<std::string> words_of_key(const std::string& key);
+
+/// What a value should be instead, by a rule; empty: the rule allows it.
+std::string problem_of_number(Rule rule, double value);
+
+/// Throws Error for a value of a key that is not as expected. `place`: of the value, with the label of the table.
+[[noreturn]] void refuse_value(const SceneKey& key, const std::string& place, const std::string& text,
+                               const std::string& expected);
 
 /// Fills the scene from its tables and records where each value was given.
 void read_tables(const toml::table& root, Scene& scene, Places& places);

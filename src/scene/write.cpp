@@ -5,6 +5,7 @@
 #include "squeal/base/markdown.hpp"
 
 #include <array>
+#include <concepts>
 #include <ranges>
 
 namespace squeal
@@ -28,19 +29,9 @@ std::string print(double value)
   return text;
 }
 
-std::string print(long value)
+template <std::integral Whole> std::string print(Whole value)
 {
-  return std::to_string(value);
-}
-
-std::string print(int value)
-{
-  return std::to_string(value);
-}
-
-std::string print(bool value)
-{
-  return value ? "true" : "false";
+  return std::is_same_v<Whole, bool> ? (value ? "true" : "false") : std::to_string(value);
 }
 
 std::string print(const std::filesystem::path& path)

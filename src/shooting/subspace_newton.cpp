@@ -1,6 +1,6 @@
 #include "subspace_newton.hpp"
 
-#include "squeal/base/callback.hpp"
+#include "squeal/base/petsc.hpp"
 #include "squeal/shooting/shooting.hpp"
 
 #include <cmath>

@@ -5,7 +5,8 @@
 #include "squeal/base/constants.hpp"
 
 #include <algorithm>
-#include <bit>
+#include <array>
+#include <boost/endian/conversion.hpp>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -25,19 +26,17 @@ template <class Number> std::vector<Number> read_big_endian(std::istream& stream
   std::vector<Number> values(static_cast<std::size_t>(count));
   auto* bytes = reinterpret_cast<char*>(values.data());
   stream.read(bytes, static_cast<std::streamsize>(values.size() * sizeof(Number)));
-  if constexpr (std::endian::native == std::endian::little)
-    for (std::size_t i = 0; i < values.size(); ++i)
-      std::reverse(bytes + i * sizeof(Number), bytes + (i + 1) * sizeof(Number));
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = boost::endian::endian_load<Number, sizeof(Number), boost::endian::order::big>(
+        reinterpret_cast<const unsigned char*>(bytes) + i * sizeof(Number));
   return values;
 }
 
 template <class Number> void append_big_endian(Number number, std::string& bytes)
 {
-  const auto* own = reinterpret_cast<const char*>(&number);
-  const std::size_t begin = bytes.size();
-  bytes.append(own, sizeof number);
-  if constexpr (std::endian::native == std::endian::little)
-    std::reverse(bytes.begin() + static_cast<std::ptrdiff_t>(begin), bytes.end());
+  std::array<unsigned char, sizeof number> ordered{};
+  boost::endian::endian_store<Number, sizeof(Number), boost::endian::order::big>(ordered.data(), number);
+  bytes.append(ordered.begin(), ordered.end());
 }
 
 /// Opens a file. Throws Error if it is missing or unreadable.

@@ -6,7 +6,6 @@
 #include "squeal/solid/interpolation.hpp"
 
 #include "squeal/mesh/location.hpp"
-#include "squeal/mesh/names.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <array>

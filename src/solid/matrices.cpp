@@ -1,5 +1,5 @@
 /// Structures given as matrices: M C K G H F of a folder, in PETSc's binary format.
-#include "matrices.hpp"
+#include "squeal/solid/structure.hpp"
 
 #include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/solid/binary.hpp"
@@ -145,20 +145,6 @@ void add_skew(const std::filesystem::path& file, PetscInt size, Owned<Mat>& skew
     skew = std::move(A);
 }
 
-/// Throws Error if M has a negative diagonal entry.
-void check_mass_diagonal(Mat M, const std::filesystem::path& file, MPI_Comm comm)
-{
-  Owned<Vec> diagonal;
-  check(MatCreateVecs(M, nullptr, diagonal.put()));
-  check(MatGetDiagonal(M, diagonal));
-  PetscInt place = 0;
-  PetscReal least = 0;
-  check(VecMin(diagonal, &place, &least));
-  if (least < 0)
-    agree(comm, file.string() + ": diagonal entry " + std::to_string(place) + " is " + std::to_string(least) +
-                    "; a mass matrix has none below zero");
-}
-
 /// Throws Error if M has a negative eigenvalue. They are counted for D^-1 M, D the diagonal of M, so that units of
 /// rotations do not matter. Rounding of an exported M moves them by about symmetry_tolerance.
 void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
@@ -168,6 +154,7 @@ void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
   PetscReal largest = 0;
   check(MatCreateVecs(M, nullptr, diagonal.put()));
   check(MatGetDiagonal(M, diagonal));
+  check(VecAbs(diagonal));
   check(VecMax(diagonal, nullptr, &largest));
   if (largest == 0) largest = 1;
   PetscScalar* entries = nullptr;
@@ -186,15 +173,8 @@ void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
                                        factor.negative_pivots()));
 }
 
-} // namespace
-
-void mark_symmetric(Mat A)
-{
-  check(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
-  check(MatSetOption(A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
-  check(MatSetOption(A, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_TRUE));
-}
-
+/// Gives M, C and K the union of their patterns with the whole diagonal, and marks them as symmetric.
+/// A sum M + a C + b K then needs additions of values only.
 void share_pattern(Structure& structure)
 {
   Owned<Mat> pattern = copy_of(structure.M);
@@ -205,6 +185,15 @@ void share_pattern(Structure& structure)
   structure.M = with_pattern(pattern, structure.M);
   structure.C = with_pattern(pattern, structure.C);
   structure.K = with_pattern(pattern, structure.K);
+}
+
+} // namespace
+
+void mark_symmetric(Mat A)
+{
+  check(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
+  check(MatSetOption(A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  check(MatSetOption(A, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_TRUE));
 }
 
 Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm)
@@ -225,7 +214,6 @@ Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm)
   }
   add_skew(folder / "G.petsc", size, structure.G, comm);
   add_skew(folder / "H.petsc", size, structure.H, comm);
-  check_mass_diagonal(structure.M, folder / "M.petsc", comm);
   share_pattern(structure);
   check_mass(structure.M, folder / "M.petsc", comm);
   check(MatCreateVecs(structure.K, nullptr, structure.load.put()));
@@ -240,6 +228,26 @@ Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm)
                 std::to_string(size) + " x " + std::to_string(size));
   set_all_entries(structure.load, force);
   return structure;
+}
+
+std::optional<Rayleigh> rayleigh_part(Mat M, Mat C, Mat K)
+{
+  constexpr double rounding = 1e-13, least_angle = 1e-3; // the latter's sine, squared
+  const MultiVector tests = random_multivector(K, 2);
+  const MultiVector of_M = product(M, tests), of_K = product(K, tests);
+  MultiVector of_C = product(C, tests);
+  const auto inner = [](const MultiVector& a, const MultiVector& b) { return inner_products(a, b).trace(); };
+  const double mass = std::sqrt(inner(of_M, of_M)), stiffness = std::sqrt(inner(of_K, of_K));
+  if (mass == 0 || stiffness == 0) return std::nullopt;
+  const double common = inner(of_M, of_K) / (mass * stiffness), apart = 1 - common * common;
+  if (apart < least_angle) return std::nullopt;
+  const double along_M = inner(of_M, of_C) / mass, along_K = inner(of_K, of_C) / stiffness,
+               size = std::sqrt(inner(of_C, of_C));
+  const Rayleigh result{(along_M - common * along_K) / (apart * mass),
+                        (along_K - common * along_M) / (apart * stiffness)};
+  of_C.entries -= result.of_mass * of_M.entries + result.of_stiffness * of_K.entries;
+  if (!(std::sqrt(inner(of_C, of_C)) <= rounding * size)) return std::nullopt;
+  return result;
 }
 
 } // namespace squeal

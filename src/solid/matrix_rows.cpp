@@ -2,7 +2,6 @@
 #include "squeal/solid/matrix_rows.hpp"
 
 #include "squeal/base/broadcast.hpp"
-#include "squeal/scene/row_names.hpp"
 #include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "squeal/solid/mesh_piece.hpp"
+#include "squeal/solid/dofs.hpp"
 
 #include "local_dofs.hpp"
 #include "squeal/base/broadcast.hpp"

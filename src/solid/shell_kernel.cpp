@@ -1,5 +1,4 @@
-/// Flat shells: membrane with drilling rotation (shell_membrane.cpp) and plate (shell_plate.cpp) in the element's
-/// plane,
+/// Flat shells: membrane with drilling rotation and plate in the element's plane,
 ///     D = diag(h C, G h, h^3/12 C, kappa G h I),
 /// with C of plane stress, h the thickness, G the shear modulus and kappa = 5/6 the shear correction.
 ///
@@ -8,15 +7,35 @@
 /// of the displacements, with sides curved by the rotations of their ends, and rho h^3/12 N_i N_j on all three
 /// rotations. The drilling rotation is included, so that M is positive definite and the same in all axes. Caveat: flat
 /// elements do not couple membrane and bending, so that curved shells converge with the mesh only.
-#include "shell_kernel.hpp"
-
-#include "condensation.hpp"
-#include "jacobian.hpp"
-#include "shell_membrane.hpp"
-#include "shell_plate.hpp"
+///
+/// The membrane has a rotation about the normal at each node (drilling rotation).
+///
+/// shell4: bilinear with Wilson's incompatible modes 1 - xi^2, 1 - eta^2 in Taylor's corrected form, as hex8. The
+/// drilling rotation is coupled to the rotation of the membrane by the energy  G h int ((v,x - u,y)/2 - rz)^2 dA
+/// (Hughes and Brezzi 1989). The modes enter the membrane's rotation too, so that in-plane bending of a rectangle stays
+/// exact. With full integration there is no zero-energy mode beside the rigid motions.
+///
+/// shell3: the optimal triangle OPT (Felippa, Comput. Methods Appl. Mech. Eng. 192, 2003, 2125), with
+/// beta = (1, 2, 1, 0, 1, -1, -1, -1, -2), alpha_b = 3/2, beta_0 = (1 - 4 nu^2)/2. In-plane bending of a rectangle is
+/// exact at any aspect ratio.
+///     strain = mean + 3/2 sqrt(beta_0) T_e Q theta~,   theta~_i = rz_i - rotation of the linear triangle
+/// At the middle of side ij, Q is the mean of its values at the corners i and j. The deviations from the mean strain at
+/// the three points sum to zero.
+///
+/// Plate bending with transverse shear is that of the discrete Kirchhoff-Mindlin triangle DKMT and quadrilateral DKMQ
+/// (Katili, Int. J. Numer. Methods Eng. 36, 1993, 1859 and 1885). They do not lock when thin, converge to discrete
+/// Kirchhoff elements, and pass the patch test.
+///
+///     beta_x = ry, beta_y = -rx: rotation of the fibre, u = z beta;   beta = sum N_i beta_i + sum_k P_k t_k a_k,
+/// with P_k the quadratic bubble of side k, which goes from i to j, has the length L and the direction t. The amplitude
+/// a_k follows from equilibrium, gamma_k = -2/3 phi_k a_k with phi_k = 12 D_b / (D_s L^2), and from the mean of
+/// w,s + beta_s = gamma_k on the side:
+///     a_k = -3 / (2 L (1 + phi_k)) (w_j - w_i + L/2 t . (beta_i + beta_j)).
+/// The shear strain is the field with the constant tangential value gamma_k on each side (edge functions).
+#include "kernels.hpp"
 #include "squeal/mesh/quadrature.hpp"
 
-#include <stdexcept>
+#include <cmath>
 
 namespace squeal
 {
@@ -28,6 +47,140 @@ using Matrix9 = Eigen::Matrix<double, 9, 9>;
 template <int n> using Square = Eigen::Matrix<double, 6 * n, 6 * n>; // on u v w rx ry rz of each node
 constexpr double shear_correction = 5. / 6;
 
+/// Strains of unit nodal displacements of an element with n nodes, in its own axes. Columns: u v w rx ry rz of each
+/// node. Rows: membrane exx eyy gxy; drilling strain; curvatures kxx kyy kxy; transverse shear gxz gyz.
+template <int n> using ShellStrains = Eigen::Matrix<double, 9, 6 * n>;
+template <int n> using PlanePositions = Eigen::Matrix<double, 2, n>; // [m] one node a column
+template <int n> using Gradients = Eigen::Matrix<double, 2, n>;
+
+/// Adds the membrane and drilling strains of shell4; `gradients` holds dN/dx, dN/dy [1/m] in its rows.
+void add_quad_membrane(ShellStrains<4>& B, const NodeValues& N, const Eigen::Matrix<double, 2, 4>& gradients)
+{
+  for (Eigen::Index i = 0; i < 4; ++i)
+  {
+    const double x = gradients(0, i), y = gradients(1, i);
+    B.block<4, 1>(0, 6 * i) << x, 0, y, -0.5 * y;
+    B.block<4, 1>(0, 6 * i + 1) << 0, y, x, 0.5 * x;
+    B(3, 6 * i + 5) = -N(i);
+  }
+}
+
+/// Strains of unit amplitudes of the incompatible modes 1 - xi^2 and 1 - eta^2, each in u and v.
+using ShellModeStrains = Eigen::Matrix<double, 9, 4>;
+
+/// Returns the strains of the incompatible modes. `mean_inverse` is det(J0)/det(J) J0^-1 [1/m], J0 at the centre.
+ShellModeStrains quad_membrane_modes(const Eigen::Vector3d& xi, const Eigen::Matrix2d& mean_inverse)
+{
+  ShellModeStrains Ba = ShellModeStrains::Zero();
+  for (int k = 0; k < 2; ++k)
+  {
+    const Eigen::Vector2d g = -2 * xi(k) * mean_inverse.col(k);
+    Ba.block<4, 1>(0, 2 * k) << g(0), 0, g(1), -0.5 * g(1);
+    Ba.block<4, 1>(0, 2 * k + 1) << 0, g(1), g(0), 0.5 * g(0);
+  }
+  return Ba;
+}
+
+constexpr double alpha_b = 1.5;
+
+/// Adds the mean strain: that of the linear triangle, and that of sides curved by the drilling rotations (Allman).
+void add_mean_strain(ShellStrains<3>& B, const PlanePositions<3>& X, double area)
+{
+  for (int i = 0; i < 3; ++i)
+  {
+    const Eigen::Vector2d xi = X.col(i), xj = X.col((i + 1) % 3), xk = X.col((i + 2) % 3);
+    const Eigen::Vector2d ij = xi - xj, ki = xk - xi, jk = xj - xk;
+    const double scale = 0.5 / area, a = alpha_b * scale;
+    B.block<3, 1>(0, 6 * i) += scale * Eigen::Vector3d(jk(1), 0, -jk(0));
+    B.block<3, 1>(0, 6 * i + 1) += scale * Eigen::Vector3d(0, -jk(0), jk(1));
+    B.block<3, 1>(0, 6 * i + 5) += a * Eigen::Vector3d(jk(1) * (ij(1) - ki(1)) / 6, -jk(0) * (ki(0) - ij(0)) / 6,
+                                                       (ij(0) * ij(1) - ki(0) * ki(1)) / 3);
+  }
+}
+
+/// Returns Q at a corner: strains along the sides 01, 12, 20 of unit deviatoric rotations theta~ of the nodes.
+Eigen::Matrix3d corner_strains(int corner, double area, const Eigen::Vector3d& squared_length)
+{
+  constexpr double beta[3][3] = {{1, 2, 1}, {0, 1, -1}, {-1, -1, -2}};
+  Eigen::Matrix3d Q;
+  for (int side = 0; side < 3; ++side)
+    for (int node = 0; node < 3; ++node)
+      Q(side, node) = 2 * area / 3 * beta[(side + 3 - corner) % 3][(node + 3 - corner) % 3] / squared_length(side);
+  return Q;
+}
+
+/// Adds the membrane strains of shell3 at the middle of a side: side 0 between nodes 0 and 1, and so on.
+void add_triangle_membrane(ShellStrains<3>& B, const PlanePositions<3>& X, double poisson, int side)
+{
+  Eigen::Matrix2d frame;
+  frame << X.col(1) - X.col(0), X.col(2) - X.col(0);
+  const double area = 0.5 * frame.determinant();
+  add_mean_strain(B, X, area);
+
+  Eigen::Matrix3d along; // maps exx eyy gxy to the strains along the sides
+  Eigen::Vector3d squared_length;
+  using Rotations = Eigen::Matrix<double, 3, 18>;
+  Rotations theta = Rotations::Zero(); // theta~ of unit nodal displacements
+  for (int i = 0; i < 3; ++i)
+  {
+    const Eigen::Vector2d s = X.col((i + 1) % 3) - X.col(i), jk = X.col((i + 1) % 3) - X.col((i + 2) % 3);
+    squared_length(i) = s.squaredNorm();
+    along.row(i) << s(0) * s(0), s(1) * s(1), s(0) * s(1);
+    along.row(i) /= squared_length(i);
+    theta.col(6 * i).setConstant(-jk(0) / (4 * area));
+    theta.col(6 * i + 1).setConstant(-jk(1) / (4 * area));
+    theta(i, 6 * i + 5) = 1;
+  }
+  const Eigen::Matrix3d Q =
+      0.5 * (corner_strains(side, area, squared_length) + corner_strains((side + 1) % 3, area, squared_length));
+  const double beta_0 = std::max(0.5 * (1 - 4 * poisson * poisson), 0.01); // the bound keeps full rank near nu = 1/2
+  const Eigen::Matrix3d strains = 1.5 * std::sqrt(beta_0) * along.inverse() * Q;
+  B.topRows<3>() += strains * theta;
+}
+
+/// Returns the edge function of side k: its tangential component is 1/L on this side and zero on the others.
+template <int n> Eigen::Vector2d edge_function(Eigen::Index k, const NodeValues& N, const Gradients<n>& g)
+{
+  const auto j = (k + 1) % n;
+  if constexpr (n == 3) return N(k) * g.col(j) - N(j) * g.col(k);
+  // (N_i + N_j)/2 times the gradient of the natural coordinate that increases from i to j.
+  const auto before = (k + 3) % 4, after = (k + 2) % 4;
+  return 0.5 * (N(k) + N(j)) * (g.col(j) + g.col(after) - g.col(k) - g.col(before));
+}
+
+/// Adds curvatures and transverse shear at xi, n = 3 or 4.
+/// `slenderness` is 12 D_b / D_s = 2 h^2 / (kappa (1 - nu)) [m2], h the thickness and kappa the shear correction.
+template <int n>
+void add_plate(ShellStrains<n>& B, const PlanePositions<n>& X, const Eigen::Vector3d& xi, double slenderness)
+{
+  const ShapeFunctions at = shape_functions(n == 3 ? FaceShape::triangle3 : FaceShape::quad4, xi);
+  const ShapeFunctions quadratic = shape_functions(n == 3 ? FaceShape::triangle6 : FaceShape::quad8, xi);
+  const Eigen::Matrix2d inverse = (at.dN.topRows<2>() * X.transpose()).inverse();
+  const Gradients<n> g = inverse * at.dN.topRows<2>();
+  const Gradients<n> P = inverse * quadratic.dN.topRows<2>().rightCols(n);
+  for (Eigen::Index i = 0; i < n; ++i)
+  {
+    B.template block<3, 1>(4, 6 * i + 4) << g(0, i), 0, g(1, i);   // beta_x = ry
+    B.template block<3, 1>(4, 6 * i + 3) << 0, -g(1, i), -g(0, i); // beta_y = -rx
+  }
+  for (Eigen::Index k = 0; k < n; ++k)
+  {
+    const auto j = (k + 1) % n;
+    const Eigen::Vector2d side = X.col(j) - X.col(k);
+    const double L = side.norm(), phi = slenderness / (L * L);
+    const Eigen::Vector2d t = side / L;
+    Eigen::RowVector<double, 6 * n> a = Eigen::RowVector<double, 6 * n>::Zero(); // a_k of unit nodal displacements
+    a(6 * k + 2) = -1;
+    a(6 * j + 2) = 1;
+    for (const auto node : {k, j}) a.template segment<2>(6 * node + 3) << -0.5 * L * t(1), 0.5 * L * t(0);
+    a *= -1.5 / (L * (1 + phi));
+    B.row(4) += P(0, k) * t(0) * a;
+    B.row(5) += P(1, k) * t(1) * a;
+    B.row(6) += (P(1, k) * t(0) + P(0, k) * t(1)) * a;
+    B.template bottomRows<2>() += edge_function<n>(k, at.N, g) * (-2. / 3 * phi * L) * a;
+  }
+}
+
 /// The plane of an element with n nodes.
 template <int n> struct Facet
 {
@@ -36,15 +189,14 @@ template <int n> struct Facet
   Eigen::Vector<double, n> offset; // [m] nodes along z from the plane
 };
 
-/// Returns the plane of an element; its x is the projection of `direction` (of any length) on the plane.
-template <int n> Facet<n> make_facet(const NodePositions& X, const Eigen::Vector3d& direction)
+/// Returns the plane of an element; its x is the projection of the first side on the plane.
+template <int n> Facet<n> make_facet(const NodePositions& X)
 {
-  const Eigen::Vector3d a = n == 3 ? X.col(1) - X.col(0) : X.col(2) - X.col(0);
+  const Eigen::Vector3d side = X.col(1) - X.col(0);
+  const Eigen::Vector3d a = n == 3 ? side : X.col(2) - X.col(0);
   const Eigen::Vector3d b = n == 3 ? X.col(2) - X.col(0) : X.col(3) - X.col(1);
   const Eigen::Vector3d area = a.cross(b), z = area / positive_jacobian(area.norm(), 0);
-  const Eigen::Vector3d x = direction - direction.dot(z) * z;
-  if (!(x.norm() > 1e-6 * direction.norm()))
-    throw std::runtime_error("the axis of the shell's resultants is normal to the element; give one along the surface");
+  const Eigen::Vector3d x = side - side.dot(z) * z;
   Facet<n> facet;
   facet.axes << x.normalized().transpose(), z.cross(x).normalized().transpose(), z.transpose();
   const Eigen::Matrix<double, 3, n> local = facet.axes * (X.colwise() - X.rowwise().mean().eval());
@@ -154,7 +306,7 @@ template <int n> Square<n> plane_mass(const PlanePositions<n>& X, double density
 
 template <int n> ElementMatrices matrices(const NodePositions& X, const Material& material, double h)
 {
-  const Facet<n> facet = make_facet<n>(X, X.col(1) - X.col(0));
+  const Facet<n> facet = make_facet<n>(X);
   const Square<n> T = local_transformation(facet);
   const auto in_global_axes = [&](const Square<n>& A) -> Eigen::MatrixXd
   {
@@ -166,34 +318,11 @@ template <int n> ElementMatrices matrices(const NodePositions& X, const Material
           in_global_axes(plane_mass<n>(facet.plane, material.density, h))};
 }
 
-template <int n> std::vector<std::array<double, 6>> resultants(const Facet<n>& facet, const Material& material,
-                                                               double h, std::span<const double> u)
-{
-  const Eigen::Map<const Eigen::Vector<double, 6 * n>> displacement(u.data());
-  const Eigen::Vector<double, 6 * n> local = local_transformation(facet) * displacement;
-  std::vector<std::array<double, 6>> result;
-  for (const auto& [B, area] : strain_points<n>(facet.plane, material, h))
-  {
-    const Eigen::Vector<double, 9> r = elasticity(material, h) * (B * local);
-    result.push_back({r(0), r(1), r(2), r(4), r(5), r(6)});
-  }
-  return result;
-}
-
 } // namespace
 
 ElementMatrices shell_matrices(Shape shape, const NodePositions& X, const Material& material, double thickness)
 {
   return shape == Shape::shell3 ? matrices<3>(X, material, thickness) : matrices<4>(X, material, thickness);
-}
-
-std::vector<std::array<double, 6>> shell_resultants(Shape shape, std::span<const Vec3> x, const Material& material,
-                                                    double thickness, const Vec3& axis1, std::span<const double> u)
-{
-  const NodePositions X = position_matrix(x);
-  const Eigen::Vector3d direction(axis1.data());
-  return shape == Shape::shell3 ? resultants<3>(make_facet<3>(X, direction), material, thickness, u)
-                                : resultants<4>(make_facet<4>(X, direction), material, thickness, u);
 }
 
 } // namespace squeal

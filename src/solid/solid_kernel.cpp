@@ -13,11 +13,9 @@
 /// Caveats: wedge6 is stiff in bending within the plane of its triangles, as the constant-strain triangle is; it is for
 /// filling, not for beams. tet4 has constant strains and is stiff in all bending. hex8 is exact in bending as a
 /// parallelepiped and stiffer when tapered (MacNeal 1987), as all 8-node bricks are.
-#include "solid_kernel.hpp"
-
-#include "condensation.hpp"
-#include "jacobian.hpp"
+#include "kernels.hpp"
 #include "squeal/mesh/quadrature.hpp"
+#include "squeal/mesh/shapes.hpp"
 
 #include <Eigen/LU>
 
@@ -305,6 +303,17 @@ std::vector<std::array<double, 6>> solid_stress(Shape shape, std::span<const Vec
                        }
                        return stress;
                      });
+}
+
+int dofs_per_node(Shape shape)
+{
+  return is_shell(shape) ? 6 : 3;
+}
+
+ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Material& material, double thickness)
+{
+  const NodePositions X = position_matrix(x);
+  return is_shell(shape) ? shell_matrices(shape, X, material, thickness) : solid_matrices(shape, X, material);
 }
 
 } // namespace squeal

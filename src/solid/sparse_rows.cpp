@@ -1,6 +1,6 @@
 #include "squeal/solid/sparse_rows.hpp"
 
-#include "squeal/base/broadcast.hpp"
+#include "squeal/base/packed.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,29 +13,6 @@ void add_displacement(const DofMap& dofs, int node, const Vec3& direction, Spars
   for (int c = 0; c < 3; ++c)
     for (const DofTerm& term : dofs.terms_of(6 * PetscInt{node} + c)) row[term.dof] += direction[c] * term.factor;
 }
-
-namespace
-{
-
-/// Rows one after the other, as they are sent.
-struct SentRows
-{
-  std::vector<std::size_t> sizes;
-  std::vector<DofTerm> entries;
-};
-
-SentRows sent(std::span<const SparseRow> rows)
-{
-  SentRows result;
-  for (const SparseRow& row : rows)
-  {
-    result.sizes.push_back(row.size());
-    for (const auto& [dof, factor] : row) result.entries.push_back({dof, factor});
-  }
-  return result;
-}
-
-} // namespace
 
 std::vector<SparseRow> scattered_rows(std::vector<SparseRow> rows, PetscInt count, MPI_Comm comm)
 {
@@ -50,24 +27,15 @@ std::vector<SparseRow> scattered_rows(std::vector<SparseRow> rows, PetscInt coun
   {
     for (int to = 1; to < ranks_of(comm); ++to)
     {
-      const SentRows others = sent(rows_of(to));
-      send(others.sizes, to, comm);
-      send(others.entries, to, comm);
+      const std::span<const SparseRow> others = rows_of(to);
+      send(packed(std::vector<SparseRow>(others.begin(), others.end())), to, comm);
     }
     rows.resize(rows_of(0).size());
     return rows;
   }
-  SentRows received;
-  receive(received.sizes, 0, comm);
-  receive(received.entries, 0, comm);
-  std::vector<SparseRow> own;
-  auto entry = received.entries.cbegin();
-  for (const std::size_t size : received.sizes)
-  {
-    SparseRow& row = own.emplace_back();
-    for (std::size_t i = 0; i < size; ++i, ++entry) row.emplace_hint(row.end(), entry->dof, entry->factor);
-  }
-  return own;
+  std::string received;
+  receive(received, 0, comm);
+  return unpacked<std::vector<SparseRow>>(received);
 }
 
 Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_columns, MPI_Comm comm)
@@ -104,6 +72,55 @@ std::pair<PetscInt, PetscInt> range_of(PetscInt count, PetscInt rank, PetscInt r
   const PetscInt size = count / ranks, rest = count % ranks;
   const PetscInt first = rank * size + std::min(rank, rest);
   return {first, first + size + (rank < rest ? 1 : 0)};
+}
+
+namespace
+{
+
+int probed_node(const Probe& probe, const Mesh& mesh)
+{
+  const std::string user = "probe " + probe.name;
+  const auto nodes = named_nodes(mesh, probe.on, user);
+  if (nodes.empty()) throw Error(user + ": group \"" + probe.on + "\" has no nodes");
+  if (nodes.size() > 1 && !probe.at)
+    throw Error(user + ": group \"" + probe.on + "\" has " + std::to_string(nodes.size()) +
+                " nodes; 'at' says which one is meant");
+  const auto distance = [&](int node) { return probe.at ? norm(mesh.nodes[node] - *probe.at) : 0; };
+  const int nearest =
+      *std::min_element(nodes.begin(), nodes.end(), [&](int a, int b) { return distance(a) < distance(b); });
+  // A position outside may be meant, to name an end; one beyond 100 lengths of the mesh is a slip, of units say.
+  if (const double size = diagonal_of(mesh.nodes); size > 0 && distance(nearest) > 100 * size)
+    throw Error(user + format(": 'at' is %g m from the nearest node of the group, where the whole mesh measures %g m",
+                              distance(nearest), size));
+  return nearest;
+}
+
+} // namespace
+
+std::vector<int> probed_nodes(const std::vector<Probe>& probes, const Mesh& mesh)
+{
+  std::vector<int> nodes;
+  for (const Probe& probe : probes) nodes.push_back(probed_node(probe, mesh));
+  return nodes;
+}
+
+Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const DofMap& dofs, MPI_Comm comm)
+{
+  std::vector<SparseRow> rows; // all of them, on rank 0
+  const auto add_all = [&]
+  {
+    for (const Probe& probe : probes)
+    {
+      SparseRow& row = rows.emplace_back();
+      add_displacement(dofs, probed_node(probe, mesh), probe.direction, row);
+      if (std::all_of(row.begin(), row.end(), [](const auto& entry) { return entry.second == 0; }))
+        throw Error("probe " + probe.name + ": the motion of " + probe.on +
+                    " in its direction is held, so it would read 0");
+    }
+  };
+  on_rank_zero(comm, add_all);
+  return matrix_of_rows(scattered_rows(std::move(rows), static_cast<PetscInt>(probes.size()), comm),
+                        dofs.last - dofs.first, comm);
 }
 
 } // namespace squeal

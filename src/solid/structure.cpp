@@ -4,18 +4,20 @@
 /// has all elements that share a degree of freedom with it, so that it counts the entries of its own rows exactly.
 /// Contributions to rows of other ranks are sent at the end of the assembly. All three matrices receive every
 /// contribution, zeros included, which gives them one pattern.
+///
+/// The load is T' f: a force is shared equally by its nodes; a pressure p is -p times the integral of N_i n dA, n
+/// outward. The share of a fixed degree of freedom is carried by its support.
 #include "squeal/solid/structure.hpp"
 
 #include "local_dofs.hpp"
-#include "matrices.hpp"
 #include "spin.hpp"
-#include "squeal/base/broadcast.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/constants.hpp"
-#include "squeal/mesh/names.hpp"
+#include "squeal/base/packed.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/solid/binary.hpp"
 #include "squeal/solid/element.hpp"
-#include "squeal/solid/loads.hpp"
 
 #include <algorithm>
 #include <Eigen/Dense>
@@ -70,13 +72,7 @@ Eigen::MatrixXd small_matrix(const std::filesystem::path& file, Eigen::Index ord
   if (size.rows != order || size.columns != order)
     throw Error(file.string() + ": " + std::to_string(size.rows) + " x " + std::to_string(size.columns) +
                 ", but dofs.txt beside it has " + std::to_string(order) + " lines");
-  const auto sparse = load_matrix(file, size, size, PETSC_COMM_SELF);
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(order, order);
-  for_each_row(sparse,
-               [&](PetscInt row, std::span<const PetscInt> columns, std::span<const PetscScalar> values)
-               {
-                 for (std::size_t k = 0; k < columns.size(); ++k) A(row, columns[k]) = values[k];
-               });
+  const Eigen::MatrixXd A = dense_copy(load_matrix(file, size, size, PETSC_COMM_SELF));
   constexpr double rounding = 1e-9; // of exported matrices
   if ((A - A.transpose()).cwiseAbs().maxCoeff() > rounding * A.cwiseAbs().maxCoeff())
     throw Error(file.string() + ": not symmetric");
@@ -156,22 +152,9 @@ RowCounts count_entries(const DofMap& dofs, const std::vector<std::vector<PetscI
 std::vector<std::vector<PetscInt>> free_dofs_of(const DofMap& dofs, const std::vector<Contribution>& lumped,
                                                 MPI_Comm comm)
 {
-  std::vector<PetscInt> sizes, together;
-  for (const Contribution& contribution : lumped)
-  {
-    const std::vector<PetscInt> free = free_dofs(dofs, contribution.nodal_dofs);
-    sizes.push_back(static_cast<PetscInt>(free.size()));
-    together.insert(together.end(), free.begin(), free.end());
-  }
-  broadcast(sizes, comm);
-  broadcast(together, comm);
   std::vector<std::vector<PetscInt>> result;
-  auto first = together.cbegin();
-  for (const PetscInt size : sizes)
-  {
-    result.emplace_back(first, first + size);
-    first += size;
-  }
+  for (const Contribution& contribution : lumped) result.push_back(free_dofs(dofs, contribution.nodal_dofs));
+  broadcast_packed(result, comm);
   return result;
 }
 
@@ -231,7 +214,58 @@ Contribution element_contribution(const MeshPiece& piece, const Scene& scene, st
   }
 }
 
+void add_force(Vec load, const DofMap& dofs, int node, const Vec3& force)
+{
+  for (int c = 0; c < 3; ++c)
+    for (const DofTerm& term : dofs.terms_of(6 * PetscInt{node} + c))
+      check(VecSetValue(load, term.dof, force[c] * term.factor, ADD_VALUES));
+}
+
+void add_pressure(Vec load, const DofMap& dofs, const Mesh& mesh, const Face& face, double pressure)
+{
+  std::vector<Vec3> x;
+  for (const int node : nodes_of(face)) x.push_back(mesh.nodes[node]);
+  const auto weights = face_weights(face.shape, x);
+  for (std::size_t i = 0; i < weights.size(); ++i) add_force(load, dofs, face.nodes[i], -pressure * weights[i]);
+}
+
+/// Throws Error for a force of which every part acts on a motion that is held.
+void check_acts(const DofMap& dofs, const std::vector<int>& nodes, const Force& force)
+{
+  if (force.vector == Vec3{}) return;
+  for (const int node : nodes)
+    for (int c = 0; c < 3; ++c)
+      if (force.vector[c] != 0 && !dofs.terms_of(6 * PetscInt{node} + c).empty()) return;
+  throw Error("force on " + force.on +
+              format(": the vector (%g, %g, %g) N", force.vector[0], force.vector[1], force.vector[2]) +
+              " acts on motions only that are held, so it would do nothing: free one of them, or remove the force");
+}
+
 } // namespace
+
+Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const DofMap& dofs, MPI_Comm comm)
+{
+  Owned<Vec> load;
+  check(VecCreate(comm, load.put()));
+  check(VecSetSizes(load, dofs.last - dofs.first, dofs.size));
+  check(VecSetType(load, VECSTANDARD));
+  const auto add_all = [&]
+  {
+    for (const Force& force : scene.forces)
+    {
+      const auto nodes = named_nodes(mesh, force.on, "force");
+      check_acts(dofs, nodes, force);
+      for (const int node : nodes) add_force(load, dofs, node, (1. / static_cast<double>(nodes.size())) * force.vector);
+    }
+    for (const Pressure& pressure : scene.pressures)
+      for (const Face& face : named_faces(mesh, pressure.on, "pressure"))
+        add_pressure(load, dofs, mesh, face, pressure.value);
+  };
+  on_rank_zero(comm, add_all);
+  check(VecAssemblyBegin(load));
+  check(VecAssemblyEnd(load));
+  return load;
+}
 
 Structure assemble(const MeshPiece& piece, const Scene& scene, MPI_Comm comm)
 {

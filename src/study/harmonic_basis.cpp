@@ -1,7 +1,7 @@
 #include "harmonic_basis.hpp"
 
 #include "squeal/algebra/dense_matrix.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <algorithm>
 #include <cmath>

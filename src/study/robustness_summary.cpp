@@ -1,7 +1,7 @@
 #include "robustness_summary.hpp"
 
 #include "squeal/base/broadcast.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 
 #include <algorithm>
 #include <boost/math/distributions/binomial.hpp>

@@ -1,7 +1,7 @@
 #include "sliding_basis.hpp"
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
-#include "squeal/base/shared.hpp"
+#include "squeal/base/petsc.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 #include <algorithm>

@@ -7,7 +7,7 @@
 ///     (T + D_Y)'A(T + D_Z) = T'A T + D_Y'(A T) + (A'T)'D_Z + D_Y'A D_Z,   A' = A or -A
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
-#include "squeal/solid/rayleigh.hpp"
+#include "squeal/solid/structure.hpp"
 
 namespace squeal
 {

@@ -67,7 +67,7 @@ Sweep run_in_groups(const SweepProblem& problem, const std::vector<SweepLine>& l
     work_in_parts(comm,
                   [&]
                   {
-                    const WorkOfPart part(group.comm());
+                    const Finally part = work_of_part(group.comm());
                     own = visit(problem, group.comm(), shares[static_cast<std::size_t>(group.number())]);
                   });
   }

@@ -23,7 +23,7 @@ std::vector<std::size_t> places_of_motions(const Sweep& sweep)
 /// The motion at a point. What cannot be computed there is in its outcome.
 SweptMotion motion_at(const SweepProblem& problem, const SweptPlace& place, MPI_Comm comm)
 {
-  const WithoutCheckpoints of_stages;
+  const Finally of_stages = without_checkpoints();
   SweptMotion motion;
   try
   {
@@ -82,7 +82,7 @@ void seek_in_groups(Sweep& sweep, const std::vector<std::size_t>& places, const 
     work_in_parts(comm,
                   [&]
                   {
-                    const WorkOfPart part(group.comm());
+                    const Finally part = work_of_part(group.comm());
                     seek_motions(sweep, share_of(places, group.number(), groups), problem, group.comm());
                   });
   }

@@ -441,7 +441,7 @@ private:
 
 Sweep visit(const SweepProblem& problem, MPI_Comm comm, const std::vector<SweepLine>& lines)
 {
-  const OneThread alone; // points are many dense problems of a few hundred rows
+  const Finally alone = one_thread(); // points are many dense problems of a few hundred rows
   return Sweeper(problem, comm).run(lines);
 }
 

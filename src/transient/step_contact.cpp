@@ -1,6 +1,6 @@
 #include "step_contact.hpp"
 
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 #include "squeal/contact/sliding_direction.hpp"
 
 #include <algorithm>

@@ -7,9 +7,9 @@
 #include "linear_contact.hpp"
 #include "squeal/algebra/lent_cores.hpp"
 #include "squeal/algebra/multivector.hpp"
-#include "squeal/base/integers.hpp"
+#include "squeal/base/error.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/solid/rayleigh.hpp"
+#include "squeal/solid/structure.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import resource
 import shutil
 import signal
 import subprocess
@@ -255,16 +254,6 @@ def test_points_beyond_the_memory_are_refused(squeal, points):
     assert run.code == 1 and len(run.messages) == 1 and "GB of memory" in run.messages[0], run.errors
 
 
-def test_a_key_of_very_many_parts_is_refused(squeal, tmp_path):
-    """The parser's recursion ended the stack at 50 000."""
-    scene = tmp_path / "deep.toml"
-    scene.write_text(".".join(["a"] * 50000) + " = 1\n" + OSCILLATOR.read_text())
-    refused(squeal(scene, ranks=1), "deep.toml, line 1", "64 parts")
-    refused(squeal(OSCILLATOR, "--set", ".".join(["a"] * 60000) + "=1", ranks=1), "--set a.a", "64 parts")
-    scene.write_text("# " + "." * 200 + " e.g. this. " * 80 + "\n" + OSCILLATOR.read_text())  # a comment may
-    assert squeal(scene, "--dry-run", ranks=1).code == 0
-
-
 @pytest.mark.parametrize("name", ["a" * 300, "loop"])
 def test_an_output_that_no_folder_can_have_is_refused(tmp_path, name):
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
@@ -277,28 +266,6 @@ def test_a_load_beyond_all_bounds_ends(squeal):
     """Newton's matrix was not finite, and its decomposition did not end."""
     run = squeal(OSCILLATOR, "--set", "force.0.vector.1=-1e16", "--set", "transient.enabled=false", ranks=1)
     assert run.code in (0, 2), run.errors
-
-
-@pytest.mark.parametrize("megabytes", [300, 500, 600, 700, 800, 900, 1000, 1200, 2000, 4000])
-def test_a_limit_of_memory_ends_the_run_or_leaves_it_alone(tmp_path, megabytes):
-    """OpenBLAS tries for ever to allocate its buffer."""
-
-    def limit():
-        resource.setrlimit(resource.RLIMIT_AS, (megabytes << 20, megabytes << 20))
-
-    done = subprocess.run([os.environ["SQUEAL"], OSCILLATOR, "--set", "cycle.enabled=false", "--output", tmp_path / "out"],
-                          capture_output=True, text=True, timeout=60, preexec_fn=limit)
-    assert done.returncode == (1 if megabytes < 600 else 0 if megabytes > 1500 else done.returncode) in (0, 1)
-    if done.returncode == 1:
-        assert "memory" in done.stderr and "ulimit -v" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
-
-
-@pytest.mark.parametrize("limit", ["-n 16", "-f 300", "-s 64"])
-def test_a_limit_that_leaves_mpi_too_little_is_one_message(tmp_path, limit):
-    """Of open files, of the size of a file, of the stack."""
-    done = subprocess.run(["bash", "-c", f'ulimit {limit}; exec "$SQUEAL" {OSCILLATOR} --output {tmp_path}/out'], capture_output=True,
-                          text=True, timeout=60)
-    assert done.returncode == 1 and f"ulimit {limit[:2]}" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
 
 
 @pytest.mark.parametrize("force", [1e11, 1e14])

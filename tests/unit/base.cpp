@@ -1,5 +1,4 @@
 // ranks: 1 2 3
-#include "squeal/base/callback.hpp"
 #include "squeal/base/petsc.hpp"
 
 #include <doctest/doctest.h>

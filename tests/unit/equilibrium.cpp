@@ -2,7 +2,7 @@
 #include "squeal/equilibrium/equilibrium.hpp"
 
 #include "../support/small_models.hpp"
-#include "squeal/base/shared.hpp"
+#include "squeal/base/petsc.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,6 @@
 // ranks: 1 2 3
 #include "../support/blocks.hpp"
-#include "squeal/mesh/build.hpp"
 #include "squeal/mesh/mesh_file.hpp"
-#include "squeal/mesh/mesh_input.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <doctest/doctest.h>
@@ -116,21 +114,21 @@ TEST_CASE("a wrong name is answered with the nearest right one")
     return problem_of([&] { read_everywhere(scene); });
   };
   CHECK(has(problem([](Scene& s) { s.parts[0].name = "lowe"; }), "did you mean 'low'?"));
-  CHECK(has(problem([](Scene& s) { s.contacts[0].rotor = "low_fase"; }), "did you mean 'low_face'?"));
   CHECK(has(problem([](Scene& s) { s.mesh->parameters["shif"] = 1; }), "did you mean 'shift'?"));
-  CHECK(has(problem([](Scene& s) { s.supports = {{"bas", {}}}; }), "did you mean 'base'?"));
   CHECK(has(problem([](Scene& s) { s.parts.pop_back(); }), "in physical group 'high'"));
   CHECK(has(problem([](Scene& s) { s.parts[0].thickness = 1; }), "remove the thickness"));
   CHECK(has(problem([](Scene& s) { s.mesh->file += ".gone"; }), "no such mesh file"));
+  const Mesh mesh = read_everywhere(block_scene(file.path()));
+  CHECK(has(problem_of([&] { (void)named_faces(mesh, "low_fase", "contact"); }), "did you mean 'low_face'?"));
+  CHECK(has(problem_of([&] { (void)named_nodes(mesh, "bas", "support"); }), "did you mean 'base'?"));
 }
 
 TEST_CASE("a group of two dimensions holds no support: all of its volume would be held")
 {
   const TemporaryFile file(std::string(blocks) + "Physical Volume(\"roof\", 77) = {2};\n", ".geo");
-  Scene scene = block_scene(file.path());
-  CHECK(read_everywhere(scene).surfaces.at("roof").size() == 9); // as a surface it has one meaning
-  scene.supports = {{"roof", {true, true, true, false, false, false}}};
-  CHECK(has(problem_of([&] { read_everywhere(scene); }), "\"roof\" names surfaces and volumes of the mesh"));
+  const Mesh mesh = read_everywhere(block_scene(file.path()));
+  CHECK(mesh.surfaces.at("roof").size() == 9); // as a surface it has one meaning
+  CHECK(has(problem_of([&] { (void)named_nodes(mesh, "roof", "support"); }), "\"roof\" names surfaces and volumes"));
 }
 
 TEST_CASE("gmsh's own words reach the message")

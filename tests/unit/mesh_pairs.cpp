@@ -2,7 +2,6 @@
 #include "../support/blocks.hpp"
 #include "../support/bricks.hpp"
 #include "squeal/mesh/contact_pairs.hpp"
-#include "squeal/mesh/partition.hpp"
 
 #include <algorithm>
 #include <doctest/doctest.h>

@@ -4,8 +4,7 @@
 #include "../support/approx.hpp"
 #include "../support/bricks.hpp"
 #include "squeal/solid/matrix_rows.hpp"
-#include "squeal/solid/mesh_piece.hpp"
-#include "squeal/solid/probes.hpp"
+#include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>
 #include <doctest/doctest.h>

@@ -22,18 +22,12 @@ namespace squeal
 /// How a matrix is factored.
 enum class FactorKind
 {
-  automatic,  // dense if A is small or full; else supernodal, or mumps where FactorOptions::limit says so
+  automatic,  // supernodal, or mumps where FactorOptions::limit says so
   supernodal, // L L' by supernodes in METIS's ordering, subtrees by ranks; the fastest
   mumps,      // MUMPS in the same ordering, spread over all ranks
-  dense,      // on rank 0
 };
 
-inline constexpr std::array factor_kind_words = {"automatic", "supernodal", "mumps", "dense"};
-
-inline Words words_of(FactorKind)
-{
-  return factor_kind_words;
-}
+template <> inline constexpr std::array words_of<FactorKind> = {"automatic", "supernodal", "mumps"};
 
 /// The orders of elimination of the last patterns, on the first rank of those that factor.
 class KnownAnalyses;
@@ -79,14 +73,14 @@ public:
   /// Whether a pivot was zero or negative: A is not positive definite, and the factor is not to be used.
   bool failed() const;
 
-  /// scale B A^-1 B', row-major, symmetric to the last bit; on rank 0 only, empty elsewhere. MUMPS and the dense factor
-  /// move their storage out: call it once, or read the strips once.
+  /// scale B A^-1 B', row-major, symmetric to the last bit; on rank 0 only, empty elsewhere. MUMPS's factor
+  /// moves its storage out: call it once, or read the strips once.
   std::vector<double> condensed(double scale) const;
 
   /// Gives B A^-1 B' to `take` on rank 0, strip after strip.
   void read_condensed(const std::function<void(const CondensedStrip&)>& take) const;
 
-  /// B A^-1 B' without storing it; nothing of MUMPS and the dense factor, which have stored it already.
+  /// B A^-1 B' without storing it; nothing of MUMPS, which has stored it already.
   std::optional<CondensedProducts> condensed_products() const;
 
   /// B A^-1 b for each b, one after the other; on rank 0 only. `backward` must follow before the next `forward`.
@@ -96,7 +90,7 @@ public:
   /// read on rank 0.
   void backward(const std::vector<double>& lambda, std::span<const Vec> x) const;
 
-  /// Entries of the triangular factor, with the border's rows but for a dense one. Collective.
+  /// Entries of the triangular factor, with the border's rows.
   double entries() const;
 
 private:
@@ -133,6 +127,20 @@ private:
 
   const Factor::Parts* parts_;
 };
+
+/// What factors of a matrix will take, by their symbolic analysis (src/README.md, section 8.9). Of all ranks together.
+struct FactorForecast
+{
+  FactorKind kind = FactorKind::automatic; // that it will be
+  double bytes = 0;                        // of a Factor while it is made, without its Schur complement
+  double symmetric = 0, not_symmetric = 0; // numbers in MUMPS's L D L' and L U of A while they are made
+  double entries = 0;                      // of L of A alone
+  double border_entries = 0;               // of E in a supernodal factor; 0: of another kind
+  double operations = 0;                   // to make a Factor, on the rank that has most to do
+};
+
+/// Of a Factor of A and B, and of MUMPS's factors of A in the same order. B may be null. Collective.
+FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options);
 
 /// x = A^-1 b. The factor has no border. Collective.
 void solve(const Factor& factor, Vec b, Vec x);

@@ -10,10 +10,14 @@ namespace squeal
 /// All entries of A on every rank. Collective.
 Eigen::MatrixXd dense_copy(Mat A);
 
-/// Gives every rank the size and the entries that rank 0 has. Collective.
-void broadcast(Eigen::MatrixXd& A, MPI_Comm comm);
-/// The same of a vector. Collective.
-void broadcast(Eigen::VectorXd& x, MPI_Comm comm);
+/// Gives every rank the size and the entries of a matrix or vector that rank 0 has. Collective.
+template <int columns> void broadcast(Eigen::Matrix<double, Eigen::Dynamic, columns>& A, MPI_Comm comm)
+{
+  Eigen::Index size[2] = {A.rows(), A.cols()};
+  MPI_Bcast(size, sizeof size, MPI_BYTE, 0, comm);
+  A.resize(size[0], size[1]);
+  MPI_Bcast(A.data(), to_int(A.size()), MPI_DOUBLE, 0, comm);
+}
 
 /// Consecutive columns, rows or entries: a rank's part of them.
 struct Share

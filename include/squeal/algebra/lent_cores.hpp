@@ -24,17 +24,7 @@ private:
 /// While it lives, this rank's BLAS has one thread: in products of a few hundred rows threads wait for each other about
 /// as long as they work, and for seconds where other programs want the cores. Nothing changes with BLAS libraries other
 /// than OpenBLAS.
-class OneThread
-{
-public:
-  OneThread();
-  OneThread(const OneThread&) = delete;
-  OneThread& operator=(const OneThread&) = delete;
-  ~OneThread();
-
-private:
-  int threads_ = 0; // of BLAS before; 0: they were left alone
-};
+Finally one_thread();
 
 /// work() on rank 0, on matrices of `rows` rows, with the cores of the others. Error on every rank: what it throws.
 template <class Work> void on_rank_zero_with_lent_cores(MPI_Comm comm, std::size_t rows, Work work)

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <optional>
+#include <petscsf.h>
 #include <span>
 #include <vector>
 
@@ -18,21 +19,14 @@ struct PairedRows
   std::vector<std::array<double, 2>> values{};
 };
 
-/// Rows of vectors that ranks send each other: those that this rank sends, and the number of those it receives, of one
-/// rank after the other.
-struct RowExchange
-{
-  std::vector<PetscInt> sent{};
-  std::vector<int> send_counts{}, receive_counts{};
-};
-
 /// The entries of M and K of this rank, and what it exchanges with others for a product.
 struct PairedMatrices
 {
   MPI_Comm comm = MPI_COMM_NULL;
-  PairedRows own;     // from the diagonal on
-  PairedRows foreign; // columns of other ranks, counted in the order in which they are received
-  RowExchange exchange;
+  PairedRows own;           // from the diagonal on
+  PairedRows foreign;       // columns of other ranks, counted in the order in which they are received
+  std::size_t received = 0; // number of these columns
+  Owned<PetscSF> exchange;  // of their rows
 };
 
 /// Nothing unless M and K are sparse. K may be null: then M's entries that are not zero. Collective.

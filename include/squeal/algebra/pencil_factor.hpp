@@ -1,8 +1,8 @@
 #pragma once
 /// The factor of K - shift M by MUMPS, with METIS's nested dissection (src/README.md, section 8.6). It takes MUMPS's
 /// own interface, since PETSc's has no way to pass an order of elimination.
+#include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/algebra/multivector.hpp"
-#include "squeal/base/options.hpp"
 
 #include <memory>
 #include <vector>
@@ -62,5 +62,9 @@ private:
   static void solve_by_rows(Parts& parts, MultiVector& Y);
   std::unique_ptr<Parts> parts_;
 };
+
+/// Memory of a PencilFactor of K and M on all ranks together [bytes], by the forecast of a factor of K.
+double forecast_pencil(const FactorForecast& forecast, double entries_of_K, Symmetry symmetry,
+                       const PencilOptions& options, MPI_Comm comm);
 
 } // namespace squeal

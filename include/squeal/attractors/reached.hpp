@@ -20,12 +20,7 @@ enum class ReachedKind
   unsettled, // the energy is not stationary, or its spread falls
 };
 
-inline constexpr std::array reached_words = {"rest", "steady", "varying", "unsettled"};
-
-inline Words words_of(ReachedKind)
-{
-  return reached_words;
-}
+template <> inline constexpr std::array words_of<ReachedKind> = {"rest", "steady", "varying", "unsettled"};
 
 /// A motion that starts lead to.
 struct ReachedMotion

@@ -1,6 +1,7 @@
 #pragma once
 /// Checkpoints: lists of numbers from which a run that was killed goes on. A stage describes its state once; the
 /// description writes it and reads it. Files are made on rank 0, one for each stage.
+#include "squeal/base/finally.hpp"
 #include "squeal/base/outcome.hpp"
 
 #include <array>
@@ -95,17 +96,7 @@ struct CheckpointPlace
 void open_checkpoints(const CheckpointPlace& place);
 
 /// While one lives, none is kept or read: for work that repeats stages of the run with other numbers.
-class WithoutCheckpoints
-{
-public:
-  WithoutCheckpoints();
-  WithoutCheckpoints(const WithoutCheckpoints&) = delete;
-  WithoutCheckpoints& operator=(const WithoutCheckpoints&) = delete;
-  ~WithoutCheckpoints();
-
-private:
-  CheckpointPlace before_;
-};
+Finally without_checkpoints();
 
 /// Writes a checkpoint under a name, whole or not at all. A disk that is full is a warning: the run is worth more.
 /// Collective.

@@ -9,6 +9,7 @@
 #include <mpi.h>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace squeal
@@ -111,6 +112,14 @@ template <class Words> std::string spelling_hint(const std::string& word, const 
 {
   const std::string best = nearest_word(word, known);
   return best.empty() ? "" : "; did you mean '" + best + "'?";
+}
+
+/// A size as the int that MPI, METIS and MUMPS take. Throws Error if it does not fit.
+template <class Integer> int to_int(Integer value)
+{
+  if (!std::in_range<int>(value))
+    throw Error("a size of " + std::to_string(value) + " exceeds what MPI, METIS and MUMPS take (2^31 - 1)");
+  return static_cast<int>(value);
 }
 
 } // namespace squeal

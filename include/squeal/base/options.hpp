@@ -40,6 +40,6 @@ void read_options(const OptionList& options);
 std::string value_of(const Option& option);
 
 /// The words that an option may take; empty for numbers and switches.
-Words words_of(const Option& option);
+Words choices_of(const Option& option);
 
 } // namespace squeal

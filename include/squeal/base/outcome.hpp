@@ -27,18 +27,13 @@ enum class OutcomeKind
   interrupted, // asked to end: its results so far
 };
 
-inline constexpr std::array outcome_words = {"skipped",        "off",
-                                             "refused",        "converged",
-                                             "completed",      "balance",
-                                             "no balance",     "not converged",
-                                             "no equilibrium", "collapsed to equilibrium",
-                                             "not periodic",   "unstable cycle",
-                                             "settled",        "interrupted"};
-
-inline Words words_of(OutcomeKind)
-{
-  return outcome_words;
-}
+template <> inline constexpr std::array words_of<OutcomeKind> = {"skipped",        "off",
+                                                                 "refused",        "converged",
+                                                                 "completed",      "balance",
+                                                                 "no balance",     "not converged",
+                                                                 "no equilibrium", "collapsed to equilibrium",
+                                                                 "not periodic",   "unstable cycle",
+                                                                 "settled",        "interrupted"};
 
 /// Which kinds a stage can end in, and what `residual` measures, stands in the header of its result.
 struct Outcome

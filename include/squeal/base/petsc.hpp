@@ -3,7 +3,9 @@
 ///
 /// The API of the libraries stays visible: functions borrow raw handles (Vec, Mat, ...), results own them (Owned<Vec>).
 #include "squeal/base/error.hpp"
+#include "squeal/base/finally.hpp"
 
+#include <exception>
 #include <slepc.h>
 #include <source_location>
 #include <span>
@@ -30,6 +32,29 @@ public:
 
 /// Throws LibraryError if a library call failed, with PETSc's text and the file and line of the caller.
 void check(PetscErrorCode code, std::source_location where = std::source_location::current());
+
+/// For functions that PETSc calls back, whose C code must not be unwound: runs `work`. An exception is kept in
+/// `failure`, and the library gets an error code.
+template <class Work> PetscErrorCode guarded(std::exception_ptr& failure, Work work)
+{
+  try
+  {
+    work();
+  }
+  catch (...)
+  {
+    failure = std::current_exception();
+    return PETSC_ERR_LIB;
+  }
+  return PETSC_SUCCESS;
+}
+
+/// After the library call: throws the exception that a callback kept, else what the call itself reports.
+inline void check_after_callbacks(PetscErrorCode code, const std::exception_ptr& failure)
+{
+  if (failure) std::rethrow_exception(failure);
+  check(code);
+}
 
 /// Sole owner of a PETSc or SLEPc object. It can be moved but not copied, and is the only place that destroys one.
 template <class Handle> class Owned
@@ -66,6 +91,13 @@ private:
 
   Handle handle_ = nullptr;
 };
+
+/// Another owner of the object, which is then not changed; null if it is null.
+template <class Handle> Owned<Handle> shared(Handle handle)
+{
+  if (handle) check(PetscObjectReference(reinterpret_cast<PetscObject>(handle)));
+  return Owned<Handle>(handle);
+}
 
 /// Returns a vector of the same layout with zero entries.
 Owned<Vec> zeros_like(Vec pattern);
@@ -124,14 +156,7 @@ double processor_time();
 double peak_memory(MPI_Comm comm);
 
 /// Enters a stage of -log_view for as long as the object lives. A new name is registered.
-class LogStage
-{
-public:
-  explicit LogStage(const char* name);
-  ~LogStage();
-  LogStage(const LogStage&) = delete;
-  LogStage& operator=(const LogStage&) = delete;
-};
+Finally log_stage(const char* name);
 
 /// The communicator of an object; rank and number of ranks in a communicator. None is collective.
 MPI_Comm comm_of(Vec x);

@@ -1,5 +1,6 @@
 #pragma once
 /// Random numbers that are the same on every machine.
+#include <cstdint>
 #include <random>
 
 namespace squeal
@@ -9,6 +10,15 @@ namespace squeal
 inline double uniform(std::mt19937_64& generator)
 {
   return static_cast<double>(generator() >> 11) * 0x1p-53;
+}
+
+/// The generator splitmix64 (Steele, Lea, Flood 2014), as a hash of a number.
+constexpr std::uint64_t splitmix64(std::uint64_t number)
+{
+  std::uint64_t x = number + 0x9e3779b97f4a7c15u;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
 }
 
 } // namespace squeal

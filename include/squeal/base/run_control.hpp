@@ -1,7 +1,8 @@
 #pragma once
 /// Requests that reach a run from outside while it computes: to end in order, by a signal or the time limit, and to
 /// make a checkpoint. One process is one run, as for signals: its control is the process's own.
-#include <functional>
+#include "squeal/base/finally.hpp"
+
 #include <mpi.h>
 #include <string>
 
@@ -41,14 +42,7 @@ bool end_is_asked(MPI_Comm comm);
 
 /// While one lives, `part` is all ranks that work together: end_is_asked() asks them. join_parts comes after.
 /// Collective among them.
-class WorkOfPart
-{
-public:
-  explicit WorkOfPart(MPI_Comm part);
-  WorkOfPart(const WorkOfPart&) = delete;
-  WorkOfPart& operator=(const WorkOfPart&) = delete;
-  ~WorkOfPart();
-};
+Finally work_of_part(MPI_Comm part);
 
 /// After parts of the ranks have worked by themselves: throws Interrupted if any of them was asked to end. Collective
 /// of all ranks.
@@ -75,14 +69,7 @@ void checkpoint_made();
 std::string who_asked_to_end();
 
 /// While one lives, nothing is asked: for short work without which what is known would be lost. By all ranks.
-class Undisturbed
-{
-public:
-  Undisturbed();
-  Undisturbed(const Undisturbed&) = delete;
-  Undisturbed& operator=(const Undisturbed&) = delete;
-  ~Undisturbed();
-};
+Finally undisturbed();
 
 /// Calls a function of METIS, and again where it failed: METIS takes a SIGTERM during the call for an error of its own.
 /// Where it does not fail again, that request is noted. Returns its code. Not collective.

@@ -1,6 +1,7 @@
 #pragma once
-/// Enums and their words. Beside each enum stands one list of its words, in the order of its values, and an overload
-/// of words_of that returns it. Scene files, options, the printed table and report.json all use that list.
+/// Enums and their words. Beside each enum stands words_of<Enum>, one list of its words in the order of its values.
+/// Scene files, options, the printed table and report.json all use that list.
+#include <array>
 #include <cstddef>
 #include <span>
 
@@ -9,10 +10,13 @@ namespace squeal
 
 using Words = std::span<const char* const>;
 
+/// The words of an enum.
+template <class Enum> extern const std::array<const char*, 0> words_of;
+
 /// The word of an enum's value.
 template <class Enum> const char* word(Enum value)
 {
-  return words_of(value)[static_cast<std::size_t>(value)];
+  return words_of<Enum>[static_cast<std::size_t>(value)];
 }
 
 /// A member of some enum type, read and set by its place in the list of words.
@@ -27,8 +31,7 @@ struct Choice
 /// The choice that reads and sets this member, which it borrows.
 template <class Enum> Choice choice_of(Enum& member)
 {
-  return {&member, words_of(member),
-          [](const void* m) { return static_cast<std::size_t>(*static_cast<const Enum*>(m)); },
+  return {&member, words_of<Enum>, [](const void* m) { return static_cast<std::size_t>(*static_cast<const Enum*>(m)); },
           [](void* m, std::size_t place) { *static_cast<Enum*>(m) = static_cast<Enum>(place); }};
 }
 

@@ -63,13 +63,8 @@ enum class BranchEventKind
   first_stick,     // beyond it pairs stick
 };
 
-inline constexpr std::array branch_event_words = {"Hopf",           "first lift-off", "fold",       "period doubling",
-                                                  "Neimark-Sacker", "grazing",        "first stick"};
-
-inline Words words_of(BranchEventKind)
-{
-  return branch_event_words;
-}
+template <> inline constexpr std::array words_of<BranchEventKind> = {
+    "Hopf", "first lift-off", "fold", "period doubling", "Neimark-Sacker", "grazing", "first stick"};
 
 /// An event and where it is.
 struct BranchEvent
@@ -94,13 +89,8 @@ enum class BranchEnding
   number_of_points, // as many points as are allowed
 };
 
-inline constexpr std::array branch_ending_words = {"not followed",    "bound",          "linear motion",
-                                                   "small amplitude", "step too small", "number of points"};
-
-inline Words words_of(BranchEnding)
-{
-  return branch_ending_words;
-}
+template <> inline constexpr std::array words_of<BranchEnding> = {
+    "not followed", "bound", "linear motion", "small amplitude", "step too small", "number of points"};
 
 /// The ends of a branch towards smaller and larger values, as it leaves the start.
 struct BranchSides

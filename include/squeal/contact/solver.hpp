@@ -28,12 +28,7 @@ enum class ContactSolver
   fixed_point,
 };
 
-inline constexpr std::array contact_solver_words = {"gauss_seidel", "fixed_point"};
-
-inline Words words_of(ContactSolver)
-{
-  return contact_solver_words;
-}
+template <> inline constexpr std::array words_of<ContactSolver> = {"gauss_seidel", "fixed_point"};
 
 /// How contact problems are solved.
 struct ContactSettings

@@ -29,12 +29,7 @@ enum class Uniqueness
   not_assured,
 };
 
-inline constexpr std::array uniqueness_words = {"not checked", "assured", "not assured"};
-
-inline Words words_of(Uniqueness)
-{
-  return uniqueness_words;
-}
+template <> inline constexpr std::array words_of<Uniqueness> = {"not checked", "assured", "not assured"};
 
 /// outcome: "converged", "no equilibrium" (the status sets cycle, or no set balances the load: mu is too large),
 /// "not converged". u and the reactions are zero without an equilibrium.

@@ -1,5 +1,6 @@
 #pragma once
-/// Contact pairs of two surfaces whose meshes need not match (src/README.md, section 1.9).
+/// Contact pairs of two surfaces whose meshes need not match (src/README.md, section 1.9), and the distribution of
+/// nodes and elements over the ranks, which keeps pairs together.
 #include "squeal/mesh/mesh.hpp"
 
 namespace squeal
@@ -49,5 +50,16 @@ ContactPairs make_pairs(const Mesh& mesh, const Scene& scene);
 
 /// Gives every rank the pairs that rank 0 has. Collective.
 void broadcast_pairs(ContactPairs& contact, MPI_Comm comm);
+
+/// Owner of each node and of each element.
+struct Partition
+{
+  std::vector<int> node_rank;
+  std::vector<int> element_rank; // the rank that owns most of the element's nodes
+};
+
+/// Returns a partition by METIS, the same at every call. The two heaviest nodes of a pair, one of each side, have the
+/// same owner. The mesh must be whole. Throws Error if there are more ranks than nodes.
+Partition partition_mesh(const Mesh& mesh, const std::vector<ContactPair>& pairs, int ranks);
 
 } // namespace squeal

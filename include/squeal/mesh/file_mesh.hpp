@@ -35,10 +35,10 @@ struct MesherAnswer
   std::string left_open; // by a kernel that cannot shut the mesher in; empty if all is shut
 };
 
-/// Returns an answer as bytes.
-std::string packed(MesherAnswer answer);
+/// Returns an answer as bytes of CBOR.
+std::string packed(const MesherAnswer& answer);
 
-/// Returns the answer that was packed. Throws std::runtime_error if the bytes are not a whole one.
+/// Returns the answer that was packed. Throws std::exception if the bytes are not a whole one.
 MesherAnswer unpacked(const std::string& bytes);
 
 /// First arguments of the mesher: it starts no program, opens no connection and writes no file, or gmsh runs all that

@@ -1,6 +1,6 @@
 #pragma once
 /// The mesh, its contact pairs and its partition. Rank 0 holds the whole mesh and prepares all that needs it; another
-/// rank receives a piece (squeal/solid/mesh_piece.hpp). This room includes no PETSc.
+/// rank receives a piece (squeal/solid/dofs.hpp). This room includes no PETSc.
 #include "squeal/scene/scene.hpp"
 
 #include <map>
@@ -73,8 +73,28 @@ struct Mesh
 /// Returns the scene's mesh with its points and reference points; without a mesh file it holds these points only.
 /// Reads the file through libgmsh; not collective. Nodes that no element uses are dropped, and elements numbered inside
 /// out are renumbered. Throws Error for a missing or unreadable file, a mesh without elements, a shape that has no
-/// kernel, and solid elements in no part. It does so for a part, group or point that the mesh does not have.
+/// kernel, and solid elements in no part. It does so for a part or a body's surface that the mesh does not have.
 Mesh read_mesh(const Scene& scene);
+
+/// Look-up of nodes and surfaces by the names that a scene uses. `user` says in messages which table of the scene asks,
+/// such as "spring" or "probe tip". Every function throws Error for an unknown name, with the nearest known one. The
+/// mesh must be whole.
+///
+/// Returns the node of a point or rigid body.
+int point_node(const Mesh& mesh, const std::string& name, const std::string& user);
+
+/// Returns the node of a point or rigid body, or else the nodes of a group, ascending.
+/// Throws Error for a group of several dimensions, as of a surface and a volume of one name.
+std::vector<int> named_nodes(const Mesh& mesh, const std::string& name, const std::string& user);
+
+/// Returns the faces of a surface.
+const std::vector<Face>& named_faces(const Mesh& mesh, const std::string& name, const std::string& user);
+
+/// Returns "node 12 at (x, y, z)" for messages.
+std::string node_text(int node, const Vec3& position);
+
+/// Diagonal of the box round places [m]. Not collective.
+double diagonal_of(const std::vector<Vec3>& nodes);
 
 /// Gives every rank the mesh that rank 0 has. Collective.
 void broadcast_mesh(Mesh& mesh, MPI_Comm comm);

@@ -3,6 +3,7 @@
 #include "squeal/mesh/file_mesh.hpp"
 #include "squeal/mesh/mesh.hpp"
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -14,5 +15,25 @@ namespace squeal
 /// that starts programs. It does so for a failure or a crash of gmsh, with its message. It does so for a parameter that
 /// the .geo does not define, and in a build without libgmsh.
 FileMesh read_mesh_file(const MeshSource& source);
+
+/// Returns the parts, surfaces and groups of a file under the names that the scene gives. Throws Error as read_mesh.
+Mesh build_mesh(const FileMesh& file, const Scene& scene);
+
+/// The files that gmsh will read, and what it can be given.
+struct MeshInput
+{
+  std::vector<std::string> parameters;      // names in DefineConstant lists; none of a mesh
+  std::vector<std::filesystem::path> files; // the mesh or geometry, then what it includes or merges by name
+};
+
+/// Returns whether gmsh runs the file as a script: by its ending, since a file with another one is a mesh or a shape.
+bool is_geometry(const std::filesystem::path& file);
+
+/// Scans a geometry and the files that it includes; those that are missing are left to gmsh. Throws Error if `file`
+/// itself is no file that can be read.
+MeshInput scan_mesh_input(const std::filesystem::path& file);
+
+/// Throws Error if the first bytes do not fit the ending: gmsh would run the file as a script.
+void check_first_bytes(const std::filesystem::path& file);
 
 } // namespace squeal

@@ -50,12 +50,7 @@ enum class Certificate
   all_pairs, // the whole problem was solved
 };
 
-inline constexpr std::array certificate_words = {"none", "inertia", "all pairs"};
-
-inline Words words_of(Certificate)
-{
-  return certificate_words;
-}
+template <> inline constexpr std::array words_of<Certificate> = {"none", "inertia", "all pairs"};
 
 /// The count that shows whether a mode is missing.
 struct ModeCount
@@ -72,12 +67,7 @@ enum class ModeShapes
   all,
 };
 
-inline constexpr std::array mode_shapes_words = {"unstable", "all"};
-
-inline Words words_of(ModeShapes)
-{
-  return mode_shapes_words;
-}
+template <> inline constexpr std::array words_of<ModeShapes> = {"unstable", "all"};
 
 /// outcome: "converged", "not converged" (fewer than expected, or backward errors above 1e-8), "skipped".
 /// residual: the largest backward error reported. Where none is unstable, the mode that a given start of the cycle's
@@ -110,12 +100,7 @@ enum class ModesSolver
   toar,   // SLEPc's two-level Arnoldi around zero, with the options of -modes_pep_ and -modes_st_
 };
 
-inline constexpr std::array modes_solver_words = {"slices", "toar"};
-
-inline Words words_of(ModesSolver)
-{
-  return modes_solver_words;
-}
+template <> inline constexpr std::array words_of<ModesSolver> = {"slices", "toar"};
 
 /// Options -modes_...: how the eigenproblems are solved.
 struct ModesOptions

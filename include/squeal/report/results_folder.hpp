@@ -29,14 +29,9 @@ enum class ResultFile
   checkpoints, // a folder
 };
 
-inline constexpr std::array result_file_names = {"report.json",    "history.h5", "sweep.csv",   "sweep_motions.csv",
-                                                 "robustness.csv", "fields.h5",  "fields.xdmf", "resolved.toml",
-                                                 "options.txt",    "reduced",    "checkpoint"};
-
-inline Words words_of(ResultFile)
-{
-  return result_file_names;
-}
+template <> inline constexpr std::array words_of<ResultFile> = {
+    "report.json", "history.h5",    "sweep.csv",   "sweep_motions.csv", "robustness.csv", "fields.h5",
+    "fields.xdmf", "resolved.toml", "options.txt", "reduced",           "checkpoint"};
 
 /// Whether the run keeps checkpoints.
 enum class Checkpoints

@@ -26,13 +26,8 @@ enum class Stage
   robustness,
 };
 
-inline constexpr std::array stage_names = {"model",     "equilibrium", "modes", "estimate",  "response",
-                                           "transient", "coarse",      "cycle", "settled",   "attractors",
-                                           "branch",    "sensitivity", "sweep", "robustness"};
-
-inline Words words_of(Stage)
-{
-  return stage_names;
-}
+template <> inline constexpr std::array words_of<Stage> = {
+    "model", "equilibrium", "modes",      "estimate", "response",    "transient", "coarse",
+    "cycle", "settled",     "attractors", "branch",   "sensitivity", "sweep",     "robustness"};
 
 } // namespace squeal

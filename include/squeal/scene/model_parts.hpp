@@ -122,7 +122,7 @@ struct Superelement
 /// Fixed motions of the nodes of a group.
 struct Support
 {
-  std::string on; // named group or point; rows of a matrix scene (squeal/scene/row_names.hpp), also below
+  std::string on; // named group or point; rows of a matrix scene (RowNames), also below
   Motions fixed{};
 };
 
@@ -147,12 +147,7 @@ enum class SlaveSide
   rotor,
 };
 
-inline constexpr std::array slave_side_words = {"stator", "rotor"};
-
-inline Words words_of(SlaveSide)
-{
-  return slave_side_words;
-}
+template <> inline constexpr std::array words_of<SlaveSide> = {"stator", "rotor"};
 
 /// Contact of two named surfaces, whose meshes need not match, or of two named points. Without a reach the surfaces
 /// coincide; with one their distance along the normal is added to the gap. The sliding velocity of a pair is s = B_t v

@@ -1,7 +1,7 @@
 #pragma once
-/// A scene: everything physical that a run needs, as plain data in SI units. Sources of this header are read.cpp (from
-/// a file), write.cpp (to text) and check.cpp (contradictions). This room includes neither PETSc nor MPI. Algorithms
-/// are chosen by PETSc options, with one prefix for each stage.
+/// A scene: everything physical that a run needs, as plain data in SI units. Sources of this header are scene.cpp (from
+/// a file), write.cpp (to text), check.cpp (contradictions) and doubts.cpp (possible values that are hardly meant).
+/// This room includes neither PETSc nor MPI. Algorithms are chosen by PETSc options, with one prefix for each stage.
 #include "squeal/scene/model_parts.hpp"
 
 namespace squeal
@@ -16,12 +16,7 @@ enum class ModesMethod
   automatic,  // the full problem, and the projection beside it where the count up to the band is not certified
 };
 
-inline constexpr std::array modes_method_words = {"projection", "full", "both", "auto"};
-
-inline Words words_of(ModesMethod)
-{
-  return modes_method_words;
-}
+template <> inline constexpr std::array words_of<ModesMethod> = {"projection", "full", "both", "auto"};
 
 /// The model on which the limit cycle is computed.
 enum class CycleModel
@@ -31,12 +26,7 @@ enum class CycleModel
   automatic, // reduced as far as the required accuracy allows
 };
 
-inline constexpr std::array cycle_model_words = {"full", "reduced", "auto"};
-
-inline Words words_of(CycleModel)
-{
-  return cycle_model_words;
-}
+template <> inline constexpr std::array words_of<CycleModel> = {"full", "reduced", "auto"};
 
 /// Origin of the initial state of a motion.
 enum class StartKind
@@ -48,12 +38,7 @@ enum class StartKind
   file,        // a state file
 };
 
-inline constexpr std::array start_kind_words = {"mode", "estimate", "equilibrium", "rest", "file"};
-
-inline Words words_of(StartKind)
-{
-  return start_kind_words;
-}
+template <> inline constexpr std::array words_of<StartKind> = {"mode", "estimate", "equilibrium", "rest", "file"};
 
 /// Where a transient starts.
 struct Start
@@ -72,12 +57,7 @@ enum class CycleStartKind
   file,      // a state file
 };
 
-inline constexpr std::array cycle_start_kind_words = {"estimate", "mode", "transient", "coarse", "file"};
-
-inline Words words_of(CycleStartKind)
-{
-  return cycle_start_kind_words;
-}
+template <> inline constexpr std::array words_of<CycleStartKind> = {"estimate", "mode", "transient", "coarse", "file"};
 
 /// Where the search for the cycle starts, with its file.
 struct CycleStart
@@ -173,12 +153,7 @@ enum class SweepDirections
   both, // that of the scene, then the other
 };
 
-inline constexpr std::array sweep_directions_words = {"one", "both"};
-
-inline Words words_of(SweepDirections)
-{
-  return sweep_directions_words;
-}
+template <> inline constexpr std::array words_of<SweepDirections> = {"one", "both"};
 
 /// How far the chain of stages goes at each point of a sweep.
 enum class SweepStages
@@ -188,12 +163,7 @@ enum class SweepStages
   cycle, // or the settled motion, where modes grow
 };
 
-inline constexpr std::array sweep_stages_words = {"equilibrium", "modes", "cycle"};
-
-inline Words words_of(SweepStages)
-{
-  return sweep_stages_words;
-}
+template <> inline constexpr std::array words_of<SweepStages> = {"equilibrium", "modes", "cycle"};
 
 /// Stability at many values of one number of the scene, or of two.
 struct SweepSettings
@@ -240,12 +210,7 @@ enum class Distribution
   uniform,
 };
 
-inline constexpr std::array distribution_words = {"normal", "lognormal", "uniform"};
-
-inline Words words_of(Distribution)
-{
-  return distribution_words;
-}
+template <> inline constexpr std::array words_of<Distribution> = {"normal", "lognormal", "uniform"};
 
 /// A random number of the scene, independent of the others.
 struct UncertainNumber
@@ -322,6 +287,11 @@ struct Scene
 /// key.
 Scene read_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides);
 
+/// A sentence for each material that no solid has and each mass that none has, which a slip of units explains, and for
+/// each load that does nothing or turns round, or setting that nothing uses. Of gaps and compliances beside the model's
+/// length [m], unless that is 0.
+std::vector<std::string> doubts_about(const Scene& scene, double length);
+
 /// Returns the scene as TOML with all defaults; read_scene of it gives the same scene.
 std::string resolved_scene(const Scene& scene);
 
@@ -330,5 +300,22 @@ std::string scene_reference();
 
 /// Returns "key" for the keys before all tables, and "table.key" for those of tables that stand once in a scene.
 std::vector<std::string> scene_key_names();
+
+/// How a matrix scene names degrees of freedom: by the rows of its matrices, or by the nodes of the code they are from.
+/// "dof:7" is a row of the matrices, "node:1017" all rows of a node; lists and ranges are "node:3,8,20-40".
+struct RowNames
+{
+  struct Range
+  {
+    long first = 0, last = 0;
+  };
+  bool nodes = false; // nodes, not rows
+  std::vector<Range> ranges;
+
+  bool is_single() const { return ranges.size() == 1 && ranges[0].first == ranges[0].last; }
+};
+
+/// Returns what the text names; nothing if it is of another form.
+std::optional<RowNames> row_names(const std::string& text);
 
 } // namespace squeal

@@ -21,12 +21,7 @@ enum class MotionKind
   irregular,      // small differences grow
 };
 
-inline constexpr std::array motion_kind_words = {"undecided", "periodic", "quasi-periodic", "irregular"};
-
-inline Words words_of(MotionKind)
-{
-  return motion_kind_words;
-}
+template <> inline constexpr std::array words_of<MotionKind> = {"undecided", "periodic", "quasi-periodic", "irregular"};
 
 /// Options -settled_...
 struct SettledOptions

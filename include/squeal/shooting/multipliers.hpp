@@ -27,12 +27,7 @@ enum class Stability
   undecided, // a bar reaches across 1, the result is not complete, or a motion beside the orbit does not grow
 };
 
-inline constexpr std::array stability_words = {"", "stable", "unstable", "undecided"};
-
-inline Words words_of(Stability)
-{
-  return stability_words;
-}
+template <> inline constexpr std::array words_of<Stability> = {"", "stable", "unstable", "undecided"};
 
 /// How the largest multiplier of an unstable orbit crossed the circle |m| = 1.
 enum class Crossing
@@ -43,12 +38,7 @@ enum class Crossing
   neimark_sacker,  // as a complex pair
 };
 
-inline constexpr std::array crossing_words = {"", "fold", "period doubling", "Neimark-Sacker"};
-
-inline Words words_of(Crossing)
-{
-  return crossing_words;
-}
+template <> inline constexpr std::array words_of<Crossing> = {"", "fold", "period doubling", "Neimark-Sacker"};
 
 /// What a motion beside an orbit was seen to do that began along the fastest motion.
 struct SeenGrowth

@@ -14,12 +14,7 @@ enum class Finish
   none,        // the orbit of the subspace is the result
 };
 
-inline constexpr std::array finish_words = {"multisecant", "none"};
-
-inline Words words_of(Finish)
-{
-  return finish_words;
-}
+template <> inline constexpr std::array words_of<Finish> = {"multisecant", "none"};
 
 /// How Floquet multipliers are found (src/README.md, section 6.9).
 enum class MultiplierMethod
@@ -30,12 +25,7 @@ enum class MultiplierMethod
   arnoldi,
 };
 
-inline constexpr std::array multiplier_method_words = {"auto", "whole", "oblique", "arnoldi"};
-
-inline Words words_of(MultiplierMethod)
-{
-  return multiplier_method_words;
-}
+template <> inline constexpr std::array words_of<MultiplierMethod> = {"auto", "whole", "oblique", "arnoldi"};
 
 /// Options -cycle_... of the solver.
 struct ShootingOptions

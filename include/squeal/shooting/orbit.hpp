@@ -51,12 +51,8 @@ enum class ShootingStage
   exact_newton, // with the whole matrix of the exact tangent
 };
 
-inline constexpr std::array shooting_stage_words = {"free", "reduced", "multisecant", "full period", "newton"};
-
-inline Words words_of(ShootingStage)
-{
-  return shooting_stage_words;
-}
+template <>
+inline constexpr std::array words_of<ShootingStage> = {"free", "reduced", "multisecant", "full period", "newton"};
 
 /// One line of the history of convergence.
 struct NewtonRecord

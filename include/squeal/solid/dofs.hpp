@@ -2,7 +2,7 @@
 /// Free degrees of freedom q and constraints u = T q on nodal degrees of freedom u (src/README.md, sections 1.4, 1.6).
 /// Nodal degree of freedom 6 * node + c is component c of a node, c = 0..5 for x y z rx ry rz.
 #include "squeal/base/petsc.hpp"
-#include "squeal/mesh/partition.hpp"
+#include "squeal/mesh/contact_pairs.hpp"
 #include "squeal/mesh/row_motions.hpp"
 
 #include <span>
@@ -60,5 +60,19 @@ struct DofMap
 /// the solid nodes around it. The moments of the shell then act on the solid as couples. Throws Error for a support or
 /// rigid body that contradicts another, and if nothing is free.
 DofMap number_dofs(const Mesh& mesh, const Scene& scene, const Partition& partition, MPI_Comm comm);
+
+/// Elements with their nodes and rows of T: the whole mesh on rank 0. On another rank those that it assembles and those
+/// that share a degree of freedom with it, without named sets; nodes and elements are numbered within the piece.
+struct MeshPiece
+{
+  Mesh mesh;
+  Partition partition; // node_rank: on rank 0 alone
+  DofMap dofs;
+  std::vector<int> node_numbers{}, element_numbers{}; // in the whole mesh, ascending; empty: the same
+};
+
+/// Gives every other rank its piece of the mesh that rank 0 has numbered: what its rows of the matrices need, in the
+/// order of the whole. Collective.
+void distribute(MeshPiece& piece, MPI_Comm comm);
 
 } // namespace squeal

@@ -50,11 +50,4 @@ SpinMatrices spin_matrices(Shape shape, std::span<const Vec3> x, const Material&
 Eigen::MatrixXd stress_stiffness(Shape shape, std::span<const Vec3> x, const Material& material,
                                  std::span<const double> u);
 
-/// Returns resultants at the integration points of a shell under the nodal displacements u [m, rad], 6 a node. They are
-/// membrane forces Nx Ny Nxy = int stress dz [N/m] and moments Mx My Mxy = int z stress dz [N]. Their x is along axis1
-/// projected on the element, their z along its normal (its nodes are counter-clockwise). Throws std::runtime_error if
-/// axis1 is normal to the element.
-std::vector<std::array<double, 6>> shell_resultants(Shape shape, std::span<const Vec3> x, const Material& material,
-                                                    double thickness, const Vec3& axis1, std::span<const double> u);
-
 } // namespace squeal

@@ -2,7 +2,7 @@
 /// From the mesh to the equations of motion of the free degrees of freedom q (src/README.md, section 1.4):
 ///     M q'' + C q' + K q = load + contact forces,   C = sum of alpha M + beta K of each part, and dashpots.
 /// Supports and rigid bodies are exact constraints (squeal/solid/dofs.hpp).
-#include "squeal/solid/mesh_piece.hpp"
+#include "squeal/solid/dofs.hpp"
 
 #include <cstdint>
 
@@ -28,6 +28,9 @@ struct Structure
 /// element whose Jacobian is not positive, with its part and place.
 Structure assemble(const MeshPiece& piece, const Scene& scene, MPI_Comm comm);
 
+/// Returns the load T' f of the scene's forces and pressures [N, N m]. Collective; rank 0 has the mesh and T whole.
+Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const DofMap& dofs, MPI_Comm comm);
+
 /// Returns the structure in the files M.petsc C.petsc K.petsc F.petsc of a folder, and of G.petsc and H.petsc where
 /// they are there. C and F are zero without their files. Without a B.petsc C and K may be unsymmetric: their skew
 /// parts join G and H. Collective. Throws Error for a file that is missing, truncated or not PETSc binary, and for
@@ -40,5 +43,15 @@ bool is_large(const Structure& structure);
 
 /// Declares to PETSc that A stays symmetric and that its pattern is complete. Not collective.
 void mark_symmetric(Mat A);
+
+/// C = of_mass M + of_stiffness K
+struct Rayleigh
+{
+  double of_mass = 0, of_stiffness = 0; // [1/s, s]
+};
+
+/// The sum that C is, by what the matrices make of two random vectors: another part of C would show in them. Nothing
+/// where C is none to the rounding with which it is stored, or M and K are too alike to tell their parts. Collective.
+std::optional<Rayleigh> rayleigh_part(Mat M, Mat C, Mat K);
 
 } // namespace squeal

@@ -1,8 +1,14 @@
 #pragma once
-/// Static condensation of the internal parameters a of an element, which no neighbour shares and no load acts on:
+/// Parts that the kernels of solids and shells share. Static condensation of the internal parameters a of an element,
+/// which no neighbour shares and no load acts on:
 ///     strain = B u + Ba a,   a = -H^-1 G u,   H = int Ba' D Ba,   G = int Ba' D B,   hence   B <- B - Ba H^-1 G.
 /// Stiffness and stress then follow from the condensed B at the integration points alone.
+#include "squeal/mesh/shape_functions.hpp"
+#include "squeal/solid/element.hpp"
+
 #include <Eigen/Dense>
+#include <sstream>
+#include <stdexcept>
 #include <vector>
 
 namespace squeal
@@ -52,5 +58,19 @@ auto stiffness_matrix(const std::vector<StrainPoint<Strains>>& points, const Ela
   }
   return Square(0.5 * (K + K.transpose()));
 }
+
+/// Returns the determinant of a Jacobian. Throws std::runtime_error with its value if it is not positive.
+inline double positive_jacobian(double determinant, std::size_t point)
+{
+  if (determinant > 0) return determinant;
+  std::ostringstream text;
+  text << "the Jacobian is " << determinant << " at integration point " << point
+       << ": the element is too distorted, folded or numbered inside out; correct the mesh there";
+  throw std::runtime_error(text.str());
+}
+
+/// Returns the matrices of a solid, or of a shell, with nodes at the columns of X [m].
+ElementMatrices solid_matrices(Shape shape, const NodePositions& X, const Material& material);
+ElementMatrices shell_matrices(Shape shape, const NodePositions& X, const Material& material, double thickness);
 
 } // namespace squeal
