@@ -339,19 +339,21 @@ int steps_to_compare(const Structure& structure, int steps)
   return is_large(structure) && steps <= enough_steps ? 2 * steps : 0;
 }
 
-FloquetAnalysis examine(const CycleProblem& problem, const CycleOptions& options, const PeriodMap& map,
-                        const Orbit& orbit)
+Verdict examine(const CycleProblem& problem, const CycleOptions& options, const LimitCycle& cycle)
 {
-  PeriodMap examined{map.sliding, map.options, std::min(map.steps, enough_steps), map.theta};
-  examined.reactions = map.reactions;
-  Flow flow = flow_of(examined);
-  add_slow_motions(problem, examined,
-                   map.steps > enough_steps ? map.steps : steps_to_compare(map.sliding.structure, map.steps), flow);
-  const Vec u0 = problem.sliding.equilibrium.u;
+  const int steps = cycle.steps_per_period;
+  PeriodMap map{problem.sliding, problem.step, std::min(steps, enough_steps), cycle.theta};
+  map.reactions = problem.sliding.equilibrium.reactions;
+  Flow flow = flow_of(map);
+  add_slow_motions(problem, map, steps > enough_steps ? steps : steps_to_compare(problem.sliding.structure, steps),
+                   flow);
+  const Orbit& orbit = cycle.orbit;
   const Preconditioner none;
-  const OrbitProblem found = problem_of(
-      flow, none, {u0, displacement(orbit.state), velocity(orbit.state), orbit.period}, problem.settings.tolerance);
-  return find_multipliers(found, options.shooting, orbit, other_unstable_states(problem));
+  const OrbitProblem found = problem_of(flow, none, {problem.sliding.equilibrium.u, nullptr, nullptr, orbit.period},
+                                        problem.settings.tolerance);
+  Progress progress(comm_of(orbit.state), "cycle, verdict", 1);
+  ConvergenceLog log{progress};
+  return judge(found, options.shooting, log, orbit, other_unstable_states(problem));
 }
 
 } // namespace squeal

@@ -1,6 +1,5 @@
 #include "squeal/shooting/full_space.hpp"
 
-#include "exact_newton.hpp"
 #include "free_periods.hpp"
 #include "squeal/shooting/multisecant.hpp"
 
@@ -11,7 +10,6 @@ StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& optio
 {
   if (start.residual <= problem.tolerance) return {std::move(start), StageEnding::converged};
   if (options.finish == Finish::none) return {std::move(start), StageEnding::stalled};
-  if (has_small_tangent(problem)) return shoot_by_exact_newton(problem, options, log, start);
   Multisecant memory;
   return shoot_by_multisecant(problem, options, log, memory, start);
 }

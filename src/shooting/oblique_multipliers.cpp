@@ -302,8 +302,13 @@ Completeness coverage_of(const SlowMotions& slow, const DeflatedSearch& search)
   if (search.bounded) return {true, ""};
   return {false, format("beside the slowest motions a Ritz value of %.4f has a residual of %.1e: a larger "
                         "-cycle_multipliers would decide",
-                        std::abs(search.largest), search.residual)};
+                        std::abs(search.pair.lambda), search.residual)};
 }
+
+/// The largest pair, to what the projection may go on from.
+const SearchChoice largest_or_bounded{
+    [](const std::vector<DenseEigenpair>&, const StateBlock&) { return std::size_t{}; },
+    [](const DeflatedSearch& search) { return search.bounded || search.residual < 1e-3; }};
 
 /// The passes, and the search beside them. What that finds joins Q: a motion that the reduced model has not becomes one
 /// of the pairs, and what comes of pairs that have not settled goes. Returns why the vectors do not serve, or nothing.
@@ -317,11 +322,11 @@ std::string make_complete(const Monodromy& monodromy, const SlowMotions& slow, I
     if (std::string refusal = make_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
     coverage = {true, ""}; // a multiplier above 1 needs no other
     if (repels(passes)) return {};
-    DeflatedSearch search = search_beside(monodromy, passes.wanted, slow.others, columns);
+    const DeflatedSearch search = search_beside(monodromy, passes.wanted, slow.others, columns, largest_or_bounded);
     searched += search.columns;
     coverage = coverage_of(slow, search);
-    if (search.bounded || !search.vector || round == rounds) return {};
-    if (extend(monodromy, std::move(*search.vector), passes) == 0) return {};
+    if (search.bounded || round == rounds) return {};
+    if (extend(monodromy, combination(search.Q, parts_of(search.pair.y)), passes) == 0) return {};
   }
 }
 
@@ -339,7 +344,7 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
   multipliers.method = MultiplierMethod::oblique;
   Passes passes;
   Completeness coverage;
-  refusal = make_complete(monodromy, slow, columns > 0 ? columns : 96, passes, coverage, multipliers.periods);
+  refusal = make_complete(monodromy, slow, columns, passes, coverage, multipliers.periods);
   if (!refusal.empty()) return std::nullopt;
   take_out_shift(passes);
   multipliers.trivial_error = passes.shift_distance;
@@ -355,7 +360,7 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
     multipliers.errors.push_back(passes.bars[i]);
     multipliers.upper.push_back(std::abs(passes.pairs[i].lambda) + passes.rises[i]);
   }
-  decide(multipliers, coverage, multipliers.values.size());
+  decide(multipliers, coverage);
   if (passes.pairs.empty()) return result;
   const auto combined = [&](const Eigen::VectorXd& y)
   { return std::move(states_of(combination(passes.space.V, y), orbit.state).front()); };

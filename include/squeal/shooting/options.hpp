@@ -10,8 +10,8 @@ namespace squeal
 /// The solver of the full-space equations that ends a shooting.
 enum class Finish
 {
-  multisecant, // or Newton with the whole tangent of a small system
-  none,        // the orbit of the subspace is the result
+  multisecant,
+  none, // the orbit of the subspace is the result
 };
 
 inline constexpr std::array finish_words = {"multisecant", "none"};
@@ -24,10 +24,10 @@ inline Words words_of(Finish)
 /// How Floquet multipliers are found (src/README.md, section 6.9).
 enum class MultiplierMethod
 {
-  automatic, // by the size of the system
+  automatic, // by the columns that each takes
   whole,     // from the whole monodromy matrix
   oblique,   // by projection on approximate right and left vectors; arnoldi where there are none
-  arnoldi,
+  arnoldi,   // the largest one, in a block Arnoldi space
 };
 
 inline constexpr std::array multiplier_method_words = {"auto", "whole", "oblique", "arnoldi"};

@@ -47,11 +47,10 @@ enum class ShootingStage
   free_periods, // integration without correction
   subspace,     // Newton on the coordinates of a few given shapes
   multisecant,
-  full_period,  // one evaluation of a full model's flow
-  exact_newton, // with the whole matrix of the exact tangent
+  full_period, // one evaluation of a full model's flow
 };
 
-inline constexpr std::array shooting_stage_words = {"free", "reduced", "multisecant", "full period", "newton"};
+inline constexpr std::array shooting_stage_words = {"free", "reduced", "multisecant", "full period"};
 
 inline Words words_of(ShootingStage)
 {
