@@ -33,13 +33,16 @@ std::string step_refusal_of(const CycleProblem& problem, int steps_per_period)
   return reason.empty() ? friction_refusal(problem.sliding, &mode, theta, h, problem.step, 1) : reason;
 }
 
-/// The reduced model's cycle itself, with what one period of the full model says of it.
+/// The reduced model's cycle itself, with its verdict and what one period of the full model says of it.
 LimitCycle measured_on_full_model(const CycleCorrection& correction, const ShootingStart& start)
 {
   CycleSettings settings = correction.problem.settings;
+  CycleOptions options = correction.options;
   settings.tolerance = std::numeric_limits<double>::max(); // no correction follows
-  LimitCycle cycle = find_cycle_from(with_settings(correction.problem, settings), correction.options, start,
-                                     correction.preconditioner, 0);
+  options.shooting.finish = Finish::none;
+  options.shooting.max_periods = 1; // nor a motion beside it, which would not begin beside a cycle of the full model
+  LimitCycle cycle =
+      find_cycle_from(with_settings(correction.problem, settings), options, start, correction.preconditioner, 0);
   cycle.tolerance = 0;
   return cycle;
 }

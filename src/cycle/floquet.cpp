@@ -231,7 +231,7 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   // more pairs may be closed than the shapes can tell apart (section 7.2)
   for (Index i = 0; i < model->of_left_out.size(); ++i)
     model->compliance[static_cast<std::size_t>(i)] += model->of_left_out(i);
-  if (is_large(problem.sliding.structure)) return_freed_memory(); // of the factor that gave the attachments
+  return_freed_memory(); // of the factor that gave the attachments
   return model;
 }
 
@@ -334,9 +334,9 @@ Preconditioner recorded_preconditioner(const CycleProblem& problem, const Period
              double T, Vec x, Vec y) { apply(T, x, y); };
 }
 
-int steps_to_compare(const Structure& structure, int steps)
+int steps_to_compare(int steps)
 {
-  return is_large(structure) && steps <= enough_steps ? 2 * steps : 0;
+  return steps <= enough_steps ? 2 * steps : 0;
 }
 
 Verdict examine(const CycleProblem& problem, const CycleOptions& options, const LimitCycle& cycle)
@@ -345,8 +345,7 @@ Verdict examine(const CycleProblem& problem, const CycleOptions& options, const 
   PeriodMap map{problem.sliding, problem.step, std::min(steps, enough_steps), cycle.theta};
   map.reactions = problem.sliding.equilibrium.reactions;
   Flow flow = flow_of(map);
-  add_slow_motions(problem, map, steps > enough_steps ? steps : steps_to_compare(problem.sliding.structure, steps),
-                   flow);
+  add_slow_motions(problem, map, steps > enough_steps ? steps : steps_to_compare(steps), flow);
   const Orbit& orbit = cycle.orbit;
   const Preconditioner none;
   const OrbitProblem found = problem_of(flow, none, {problem.sliding.equilibrium.u, nullptr, nullptr, orbit.period},

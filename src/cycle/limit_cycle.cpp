@@ -47,9 +47,9 @@ template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, con
   const CycleSettings& settings = problem.settings;
   PeriodMap map{problem.sliding, problem.step, settings.steps_per_period, settings.theta};
   map.reactions = problem.sliding.equilibrium.reactions;
-  map.keeps_step = is_large(problem.sliding.structure);
+  map.keeps_step = true;
   Flow flow = flow_of(map);
-  add_slow_motions(problem, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
+  add_slow_motions(problem, map, steps_to_compare(map.steps), flow);
   CycleKeeper keeper(problem.sliding.structure);
   keeper.watch(flow);
   const Preconditioner& preconditioner = make(map, flow);

@@ -67,7 +67,7 @@ void describe_model(ReducedSearch& search)
 double highest_joining(const ReducedSearch& search)
 {
   constexpr int long_period = 128; // steps
-  const double factor = is_large(search.problem.sliding.structure) && search.steps < long_period ? 3 : 4.5;
+  const double factor = search.steps < long_period ? 3 : 4.5;
   return factor * search.problem.unstable.modes.front().frequency_hz();
 }
 

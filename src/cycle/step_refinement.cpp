@@ -2,6 +2,7 @@
 
 #include "floquet.hpp"
 
+#include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/cycle/cycle_checkpoint.hpp"
 
@@ -91,19 +92,25 @@ public:
   FineShooting& operator=(const FineShooting&) = delete;
 
   CycleAtSteps cycle() const { return {map_.steps, orbit_.period, measured_.mean_fluctuating_energy}; }
-  long periods() const { return log_.convergence.periods; }
+  const Convergence& convergence() const { return log_.convergence; }
   const Multisecant& multisecant() const { return multisecant_; }
 
   /// Shoots from the extrapolation of the last two cycles to `steps` steps a period: one or two periods do. `beyond`:
-  /// how far past the last cycle, on the line from the one before it.
+  /// how far past the last cycle, on the line from the one before it. Where none is found, the last one stands.
   StageEnding shoot_extrapolated(double beyond, int steps)
   {
     Orbit now = std::exchange(orbit_, {});
+    MeasuredPeriod measured = std::move(measured_);
+    const int before = std::exchange(map_.steps, steps);
     check(VecAXPBY(before_.state, 1 + beyond, -beyond, now.state));
-    map_.steps = steps;
     const double period = now.period + beyond * (now.period - before_.period);
     const Owned<Vec> start = std::exchange(before_, std::move(now)).state;
-    return shoot_from(start, period);
+    const StageEnding ending = shoot_from(start, period);
+    if (ending == StageEnding::converged) return ending;
+    orbit_ = std::move(before_);
+    measured_ = std::move(measured);
+    map_.steps = before;
+    return ending;
   }
 
   /// The last cycle on a grid of time that begins half a step later; nothing where none is found.
@@ -121,10 +128,9 @@ public:
     return ending == StageEnding::converged ? std::optional(moved) : std::nullopt;
   }
 
-  /// The coarse cycle with what was found in its place.
+  /// The coarse cycle with the finest one in its place.
   LimitCycle result(LimitCycle cycle)
   {
-    cycle.convergence = std::move(log_.convergence);
     cycle.tolerance = 0;
     cycle.outcome.residual = orbit_.residual;
     cycle.steps_per_period = map_.steps;
@@ -170,9 +176,10 @@ private:
 /// Errors of the step, and why the accuracy was not reached; empty: it was.
 struct Refinement
 {
-  RelativeChange step_errors;
-  std::string reason;
-  bool known_to_finer_steps = true; // the coarse cycle
+  RelativeChange step_errors{};
+  std::string reason{};
+  bool finer = false;  // a cycle was found at more steps
+  bool leaves = false; // twice as many steps led away from the coarse cycle
 };
 
 /// From the cycle at few steps a period to twice as many and on. Where the cycles agree, so must the last one on a
@@ -181,17 +188,18 @@ Refinement refine(FineShooting& shooting, double accuracy, const CycleAtSteps& c
 {
   constexpr int most_tries = 6;
   std::vector<CycleAtSteps> cycles{coarse};
-  Refinement result{{std::nan(""), std::nan("")}, {}};
+  Refinement result;
   double beyond = 0;
   for (int tries = 1, steps = 2 * coarse.steps;; ++tries)
   {
     if (const StageEnding ending = shooting.shoot_extrapolated(beyond, steps); ending != StageEnding::converged)
     {
-      result.known_to_finer_steps = tries > 1 || ending == StageEnding::stalled;
+      result.leaves = !result.finer && ending != StageEnding::stalled;
       result.reason = format("the accuracy was not reached in %ld periods of the full model at more steps a period",
-                             shooting.periods());
+                             shooting.convergence().periods);
       return result;
     }
+    result.finer = true;
     cycles.push_back(shooting.cycle());
     const int before = cycles[cycles.size() - 2].steps, now = cycles.back().steps;
     result.step_errors = step_errors_of(cycles);
@@ -254,13 +262,11 @@ FittedCycle refine_steps(const CycleCorrection& correction, FittedCycle found)
     const Refinement refinement =
         refine(shooting, fidelity.accuracy,
                {cycle.steps_per_period, cycle.orbit.period, cycle.measured.mean_fluctuating_energy});
-    fidelity.full_periods = shooting.periods();
+    cycle.convergence = shooting.convergence();
+    fidelity.full_periods = cycle.convergence.periods;
     if (!refinement.reason.empty()) fidelity.reason = refinement.reason;
-    if (!refinement.known_to_finer_steps)
-    {
-      cycle = left(std::move(cycle), problem.sliding.equilibrium.u);
-      return found;
-    }
+    if (refinement.leaves) cycle = left(std::move(cycle), problem.sliding.equilibrium.u);
+    if (!refinement.finer) return found;
     fidelity.step_frequency_error = refinement.step_errors.frequency;
     fidelity.step_energy_error = refinement.step_errors.energy;
     fidelity.frequency_error = shooting.multisecant().remaining.frequency;
@@ -272,13 +278,15 @@ FittedCycle refine_steps(const CycleCorrection& correction, FittedCycle found)
     cycle.cut_short = true;
     fidelity.reason = format("the run was ended at %d steps a period", cycle.steps_per_period);
   }
-  if (cycle.cut_short || is_large(problem.sliding.structure)) return found;
-  // impacts may make a cycle repel that attracts at few steps
+  // impacts may make a cycle repel that attracts at few steps; where that costs too much, the bars at few hold it
+  const double of_period = std::min(cycle.steps_per_period, enough_steps) * work_of_step(problem.sliding.structure),
+               columns = static_cast<double>(cycle.multipliers.periods);
+  if (cycle.cut_short || work_of_columns(columns, of_period) > affordable_work) return found;
   Verdict verdict = examine(problem, correction.options, cycle);
   if (verdict.cut_short)
   {
     cycle.cut_short = true;
-    fidelity.reason = "the run was ended while its multipliers were sought";
+    fidelity.reason = format("the run was ended at %d steps a period", cycle.steps_per_period);
     return found;
   }
   refuse_repelling(verdict, problem.unstable.modes.size() - 1, cycle.outcome);

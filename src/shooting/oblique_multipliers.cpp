@@ -7,7 +7,7 @@
 /// they are below 1 by more than their residuals, no larger multiplier is to be expected. That is likely, not
 /// proven.
 #include "deflated_search.hpp"
-#include "squeal/base/constants.hpp"
+#include "squeal/base/cost.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -24,8 +24,7 @@ using Eigen::MatrixXd;
 using Complex = std::complex<double>;
 
 constexpr double largest_condition = 1e6; // of W'V: beyond, an error of 1e-10 in Z is one of 1e-4 in mu
-// A pass leaves some 0.6 of the error: the pin needed 17. On a large model, where the bar holds more, 8 are enough.
-constexpr int passes_at_most = 24, passes_of_large_model = 8;
+constexpr int most_passes = 24;           // a pass leaves some 0.6 of the error: the pin needed 17
 
 /// The passes: what the last one found of each wanted value, in the order of the reduced model's.
 struct Passes
@@ -238,10 +237,11 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
 {
   const bool first = passes.pairs.empty();
   constexpr double settled = 2.5e-7; // what other ranks or starts may add up to: below 1e-6
-  const PetscInt dofs = dofs_of(monodromy.orbit.state);
+  constexpr int of_pass = 4;         // columns
+  const bool to_the_end = work_of_columns(most_passes * of_pass, monodromy.flow.work) <= affordable_work;
   const auto is_settled = [&](std::size_t i)
   {
-    if (dofs <= large_model) return passes.changes[i] <= settled;
+    if (to_the_end) return passes.changes[i] <= settled;
     const double beyond = std::abs(passes.pairs[i].lambda) - 1;
     if (beyond > passes.bars[i] && 2 * passes.changes[i] <= 0.1 * beyond) return true;
     // of the grid's error, which the bar holds as well: as much as that, where the verdict stands already
@@ -258,7 +258,7 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
       if (pass > 1 || !first) std::erase_if(refined, is_settled);
       if (!refined.empty()) break;
     }
-    if (refined.empty() || pass == (dofs > large_model ? passes_of_large_model : passes_at_most)) break;
+    if (refined.empty() || pass == most_passes) break;
     if (extend(monodromy, corrections(monodromy, slow, refined, passes), passes) == 0) break;
   }
   if (meaningless(passes) && !repels(passes))

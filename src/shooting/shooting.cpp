@@ -3,7 +3,7 @@
 #include "beside_orbit.hpp"
 #include "free_periods.hpp"
 #include "squeal/base/constants.hpp"
-#include "squeal/base/run_control.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/shooting/full_space.hpp"
 #include "subspace_newton.hpp"
 
@@ -99,13 +99,13 @@ bool better(const Attempt& first, const Attempt& second)
 }
 
 /// Whether a motion beside an orbit that repels leaves it so slowly that the search cannot see where it goes. It leaves
-/// from a tenth of the fluctuation to all of it. A small model is searched all the same: its periods cost little.
+/// from a tenth of the fluctuation to all of it. Where periods cost little it is searched all the same.
 bool leaves_too_slowly(const Search& search, const Attempt& attempt, int done)
 {
-  const PetscInt dofs = dofs_of(attempt.found.orbit.state);
-  if (dofs <= large_model || !attempt.repels() || attempt.verdict.floquet.multipliers.values.empty()) return false;
-  const double largest = std::abs(attempt.verdict.floquet.multipliers.values.front());
-  return std::log(10) > (search.options.free_periods - done) * std::log(std::max(largest, 1.));
+  const std::vector<std::complex<double>>& values = attempt.verdict.floquet.multipliers.values;
+  const int left = search.options.free_periods - done;
+  if (!attempt.repels() || values.empty() || left * search.problem.flow.work <= work_of_search) return false;
+  return std::log(10) > left * std::log(std::max(std::abs(values.front()), 1.));
 }
 
 /// Goes on integrating for 20, 40, 80 … periods, and shoots again after each or as soon as the motion returns three
