@@ -51,8 +51,8 @@ OptionList options_of(ProgramOptions& options)
       {"-transient_contact_solver", choice_of(contact.solver), Range::any,
        "block Gauss-Seidel, or the projection fixed point (fixed_point)"},
       {"-transient_contact_tolerance", &contact.tolerance, Range::positive,
-       "largest natural map of a pair over the largest reaction; periods of shooting that are still far from the cycle "
-       "take up to 1e-6"},
+       "largest natural map of a pair over the largest reaction; dear periods of shooting that are still far from the "
+       "cycle take up to 1e-6"},
       {"-transient_contact_rho", &contact.rho, Range::below_two,
        "step of the fixed point over 1/lambda_max(W); 0: chosen by the program"},
       {"-cycle_samples", &options.cycle.samples, Range::natural,
@@ -74,8 +74,8 @@ OptionList options_of(ProgramOptions& options)
        "grow or decay; again from a tenth and a hundredth of that where growth and multiplier differ; below 0: 200 "
        "where a whole tangent does not decide, else none"},
       {"-settled_periods", &options.settled.periods, Range::not_negative,
-       "largest number of periods integrated to see what a motion settles on where no cycle attracts; 0: 2048, or down "
-       "to 512 where periods cost more"},
+       "largest number of periods integrated to see what a motion settles on where no cycle attracts; 0: 2048, or 512 "
+       "where periods are dear"},
       {"-settled_exponents", &options.settled.exponents, Range::natural,
        "number of Lyapunov exponents of a settled motion"},
       {"-sweep_groups", &options.sweep.groups, Range::not_negative,

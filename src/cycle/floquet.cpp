@@ -3,6 +3,7 @@
 #include "preconditioner.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "squeal/cycle/reduced_flow.hpp"
 #include "squeal/cycle/reduced_spectrum.hpp"
@@ -334,9 +335,9 @@ Preconditioner recorded_preconditioner(const CycleProblem& problem, const Period
              double T, Vec x, Vec y) { apply(T, x, y); };
 }
 
-int steps_to_compare(int steps)
+int steps_to_compare(const Structure& structure, int steps)
 {
-  return steps <= enough_steps ? 2 * steps : 0;
+  return is_dear(steps * work_of_step(structure)) && steps <= enough_steps ? 2 * steps : 0;
 }
 
 Verdict examine(const CycleProblem& problem, const CycleOptions& options, const LimitCycle& cycle)
@@ -345,7 +346,8 @@ Verdict examine(const CycleProblem& problem, const CycleOptions& options, const 
   PeriodMap map{problem.sliding, problem.step, std::min(steps, enough_steps), cycle.theta};
   map.reactions = problem.sliding.equilibrium.reactions;
   Flow flow = flow_of(map);
-  add_slow_motions(problem, map, steps > enough_steps ? steps : steps_to_compare(steps), flow);
+  add_slow_motions(problem, map, steps > enough_steps ? steps : steps_to_compare(problem.sliding.structure, steps),
+                   flow);
   const Orbit& orbit = cycle.orbit;
   const Preconditioner none;
   const OrbitProblem found = problem_of(flow, none, {problem.sliding.equilibrium.u, nullptr, nullptr, orbit.period},

@@ -2,6 +2,7 @@
 
 #include "floquet.hpp"
 #include "preconditioner.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
 #include "step_refinement.hpp"
 
@@ -67,7 +68,8 @@ void describe_model(ReducedSearch& search)
 double highest_joining(const ReducedSearch& search)
 {
   constexpr int long_period = 128; // steps
-  const double factor = search.steps < long_period ? 3 : 4.5;
+  const bool dear = is_dear(search.steps * work_of_step(search.problem.sliding.structure));
+  const double factor = dear && search.steps < long_period ? 3 : 4.5;
   return factor * search.problem.unstable.modes.front().frequency_hz();
 }
 

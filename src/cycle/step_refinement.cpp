@@ -59,7 +59,7 @@ StepError step_error(const std::vector<CycleAtSteps>& cycles, double CycleAtStep
   return {std::abs(last - second * sum), std::abs(second)};
 }
 
-/// Of no tolerance: the accuracy ends the iteration.
+/// The problem without a tolerance: the accuracy ends the iteration.
 OrbitProblem orbit_problem(const CycleCorrection& correction, const Flow& flow, double period)
 {
   const Vec u0 = correction.problem.sliding.equilibrium.u;
@@ -86,6 +86,8 @@ public:
     map_.options.contact.tolerance = std::min(map_.options.contact.tolerance, 1e-3 * accuracy);
     options_.max_periods = log_.convergence.periods + most_corrections;
     multisecant_.target_error = accuracy / 2;
+    multisecant_.exact = whole_tangent_is_cheap(2. * dofs_of(coarse.orbit.state));
+    add_tangent(map_, flow_);
     keeper_.watch(flow_);
   }
   FineShooting(const FineShooting&) = delete;
@@ -279,9 +281,8 @@ FittedCycle refine_steps(const CycleCorrection& correction, FittedCycle found)
     fidelity.reason = format("the run was ended at %d steps a period", cycle.steps_per_period);
   }
   // impacts may make a cycle repel that attracts at few steps; where that costs too much, the bars at few hold it
-  const double of_period = std::min(cycle.steps_per_period, enough_steps) * work_of_step(problem.sliding.structure),
-               columns = static_cast<double>(cycle.multipliers.periods);
-  if (cycle.cut_short || work_of_columns(columns, of_period) > affordable_work) return found;
+  const double of_period = std::min(cycle.steps_per_period, enough_steps) * work_of_step(problem.sliding.structure);
+  if (cycle.cut_short || is_dear(of_period)) return found;
   Verdict verdict = examine(problem, correction.options, cycle);
   if (verdict.cut_short)
   {

@@ -206,8 +206,7 @@ void take_as_answer(const SettledMotion& motion, Outcome& of_cycle)
 SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, SettledOptions options)
 {
   const double of_period = cycle.steps_per_period * work_of_step(problem.sliding.structure);
-  if (options.periods == 0)
-    options.periods = static_cast<PetscInt>(std::clamp(work_of_settling / of_period, 512., 2048.));
+  if (options.periods == 0) options.periods = is_dear(of_period) ? 512 : 2048;
   SettledMotion motion;
   PeriodMap map{problem.sliding, problem.step, cycle.steps_per_period, cycle.theta};
   map.reactions = problem.sliding.equilibrium.reactions;

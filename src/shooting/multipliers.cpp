@@ -2,6 +2,7 @@
 
 #include "deflated_search.hpp"
 #include "squeal/base/constants.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/progress.hpp"
 #include "whole_matrix.hpp"
 
@@ -183,23 +184,30 @@ bool largest_reaches_across(const Multipliers& multipliers)
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable)
 {
-  constexpr PetscInt enough = 96; // columns of a search
+  const bool dear = is_dear(problem.flow.work);
+  const PetscInt enough = dear ? 24 : 96; // columns of a search
   if (options.multipliers == 0) return {};
   const PetscInt dofs = dofs_of(orbit.state), columns = options.multipliers > 0 ? options.multipliers : enough;
-  Progress progress(comm_of(orbit.state), "multipliers", static_cast<double>(enough));
-  const auto count = [&, done = 0.](std::size_t more) mutable
+  Monodromy monodromy{problem.flow, orbit};
+  std::optional<Progress> progress;
+  constexpr double expected_columns = 100;
+  if (dear)
   {
-    done += static_cast<double>(more);
-    progress.update(done, format("%.0f products with the period's tangent", done));
-  };
-  const Monodromy monodromy{problem.flow, orbit, count};
+    progress.emplace(comm_of(orbit.state), "multipliers", expected_columns);
+    monodromy.after_product = [&, done = 0.](std::size_t more) mutable
+    {
+      done += static_cast<double>(more);
+      progress->update(done, format("%.0f products with the period's tangent", done));
+    };
+  }
   const MultiplierMethod method = chosen_method(options, dofs);
   if (method == MultiplierMethod::whole) return from_whole_matrix(monodromy, dofs);
   std::string refusal;
   std::optional<FloquetAnalysis> projected;
   if (method == MultiplierMethod::oblique && problem.flow.slow_motions)
-    projected = multipliers_by_projection(monodromy, columns, refusal);
-  const bool tries_another = options.multiplier_method == MultiplierMethod::automatic;
+    projected = multipliers_by_projection(monodromy, options.multipliers, refusal);
+  // where periods are dear, a search that decides takes longer than the cycle
+  const bool tries_another = options.multiplier_method == MultiplierMethod::automatic && !dear;
   if (projected &&
       (!tries_another || projected->multipliers.complete || projected->multipliers.stability != Stability::undecided))
     return std::move(*projected);

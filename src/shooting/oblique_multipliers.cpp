@@ -24,7 +24,8 @@ using Eigen::MatrixXd;
 using Complex = std::complex<double>;
 
 constexpr double largest_condition = 1e6; // of W'V: beyond, an error of 1e-10 in Z is one of 1e-4 in mu
-constexpr int most_passes = 24;           // a pass leaves some 0.6 of the error: the pin needed 17
+// A pass leaves some 0.6 of the error: the pin needed 17. Where periods are dear and the bar holds more, 8 are enough.
+constexpr int most_passes = 24, most_dear_passes = 8;
 
 /// The passes: what the last one found of each wanted value, in the order of the reduced model's.
 struct Passes
@@ -237,11 +238,10 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
 {
   const bool first = passes.pairs.empty();
   constexpr double settled = 2.5e-7; // what other ranks or starts may add up to: below 1e-6
-  constexpr int of_pass = 4;         // columns
-  const bool to_the_end = work_of_columns(most_passes * of_pass, monodromy.flow.work) <= affordable_work;
+  const bool dear = is_dear(monodromy.flow.work);
   const auto is_settled = [&](std::size_t i)
   {
-    if (to_the_end) return passes.changes[i] <= settled;
+    if (!dear) return passes.changes[i] <= settled;
     const double beyond = std::abs(passes.pairs[i].lambda) - 1;
     if (beyond > passes.bars[i] && 2 * passes.changes[i] <= 0.1 * beyond) return true;
     // of the grid's error, which the bar holds as well: as much as that, where the verdict stands already
@@ -258,7 +258,7 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
       if (pass > 1 || !first) std::erase_if(refined, is_settled);
       if (!refined.empty()) break;
     }
-    if (refined.empty() || pass == most_passes) break;
+    if (refined.empty() || pass == (dear ? most_dear_passes : most_passes)) break;
     if (extend(monodromy, corrections(monodromy, slow, refined, passes), passes) == 0) break;
   }
   if (meaningless(passes) && !repels(passes))
@@ -344,7 +344,7 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
   multipliers.method = MultiplierMethod::oblique;
   Passes passes;
   Completeness coverage;
-  refusal = make_complete(monodromy, slow, columns, passes, coverage, multipliers.periods);
+  refusal = make_complete(monodromy, slow, columns > 0 ? columns : 96, passes, coverage, multipliers.periods);
   if (!refusal.empty()) return std::nullopt;
   take_out_shift(passes);
   multipliers.trivial_error = passes.shift_distance;

@@ -104,7 +104,7 @@ bool leaves_too_slowly(const Search& search, const Attempt& attempt, int done)
 {
   const std::vector<std::complex<double>>& values = attempt.verdict.floquet.multipliers.values;
   const int left = search.options.free_periods - done;
-  if (!attempt.repels() || values.empty() || left * search.problem.flow.work <= work_of_search) return false;
+  if (!attempt.repels() || values.empty() || !is_dear(search.problem.flow.work)) return false;
   return std::log(10) > left * std::log(std::max(std::abs(values.front()), 1.));
 }
 

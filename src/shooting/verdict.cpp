@@ -1,6 +1,7 @@
 #include "squeal/shooting/verdict.hpp"
 
 #include "beside_orbit.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
 
 #include <algorithm>
@@ -34,7 +35,7 @@ void hold_against_motion(const OrbitProblem& problem, const ShootingOptions& opt
                          const Orbit& orbit, Verdict& verdict)
 {
   constexpr double part = 0.01; // of the fluctuation: above the orbit's tolerance, below its saturation
-  constexpr long at_most = 80;  // periods
+  const long at_most = is_dear(problem.flow.work) ? 20 : 80; // periods
   Multipliers& multipliers = verdict.floquet.multipliers;
   const double largest = multipliers.values.empty() ? 0 : std::abs(multipliers.values.front());
   const bool unstable = multipliers.stability == Stability::unstable;

@@ -5,19 +5,26 @@
 namespace squeal
 {
 
-/// What a question beside the main one may take.
+/// Work that a question beside the main one may take.
 inline constexpr double affordable_work = 2e9;
 
-/// What the search for a motion may take.
-inline constexpr double work_of_search = 2e10;
+/// Periods that a search takes, or so.
+inline constexpr double periods_of_search = 25;
 
-/// What a settled motion may take.
-inline constexpr double work_of_settling = 1e11;
+/// Columns of the tangent that take as much as a period: they solve no contact, and share their reading.
+inline constexpr double columns_per_period = 4;
 
-/// Of columns of the tangent along a period that takes `of_period`: they solve no contact, and share their reading.
-constexpr double work_of_columns(double columns, double of_period)
+/// Whether periods of this work are dear: a search takes more than is affordable. Factors, passes of contact, columns
+/// and free periods are then spared.
+constexpr bool is_dear(double of_period)
 {
-  return columns * of_period / 4;
+  return periods_of_search * of_period > affordable_work;
+}
+
+/// Whether the whole tangent of a state with so many entries takes no more columns than a search takes work.
+constexpr bool whole_tangent_is_cheap(double entries)
+{
+  return entries <= columns_per_period * periods_of_search;
 }
 
 } // namespace squeal

@@ -31,7 +31,7 @@ inline Words words_of(MotionKind)
 /// Options -settled_...
 struct SettledOptions
 {
-  PetscInt periods = 0;   // integrated at most; 0: 512 to 2048, by their cost
+  PetscInt periods = 0;   // integrated at most; 0: 2048, and 512 where they are dear
   PetscInt exponents = 4; // Lyapunov exponents
   PetscInt shapes = 100;  // at most, that the motion is kept on
 };
