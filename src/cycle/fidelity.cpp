@@ -56,7 +56,7 @@ void note_model_errors(const CycleCorrection& correction, FittedCycle& found)
 }
 
 /// The full model's cycle from the reduced model's, whose derivative is the preconditioner, and the finer steps that
-/// the accuracy needs. Its reason says why there is none; else it has none or goes with a cycle.
+/// the accuracy needs. It does not answer where that shooting left the reduced cycle.
 FittedCycle correct_on_full_model(const ReducedSearch& search, const ReducedCycle& reduced, StepChoice steps)
 {
   const CycleProblem& problem = search.problem;
@@ -79,9 +79,8 @@ FittedCycle correct_on_full_model(const ReducedSearch& search, const ReducedCycl
   found.fidelity.full_periods = cycle.convergence.periods;
   if (cycle.cut_short) return found;
   const OutcomeKind kind = cycle.outcome.kind;
-  found.answers = kind != OutcomeKind::collapsed_to_equilibrium && kind != OutcomeKind::not_periodic;
+  found.answers = asked || (kind != OutcomeKind::collapsed_to_equilibrium && kind != OutcomeKind::not_periodic);
   if (!found.answers) found.fidelity.reason = "the full model's shooting from the reduced model's cycle left it";
-  if (asked) found.answers = true;
   if (kind == OutcomeKind::converged && steps == StepChoice::by_accuracy && !asked)
     return refine_steps(correction, std::move(found));
   if (asked || kind == OutcomeKind::converged) note_model_errors(correction, found); // else the free motion went on
