@@ -192,7 +192,7 @@ TEST_CASE("a search finds the largest multiplier beside the shift in time")
   std::vector<Owned<Vec>> other;
   other.push_back(state_of(problem.model.axes[1], problem.model.zero));
   const FloquetAnalysis few = find_multipliers(problem.orbit, options, found.orbit, other);
-  REQUIRE(few.multipliers.values.size() == 1);
+  REQUIRE(!few.multipliers.values.empty());
   CHECK(std::abs(few.multipliers.values[0] - whole.multipliers.values[0]) < 1e-4);
   CHECK(few.multipliers.trivial_error < 1e-5);
   options.multipliers = 0;
