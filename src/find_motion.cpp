@@ -3,6 +3,7 @@
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/attractors/reached.hpp"
 #include "squeal/base/constants.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/cycle/cycle_checkpoint.hpp"
 
@@ -310,6 +311,8 @@ constexpr std::array ways = {
     Way{"cycle from the settled motion", settles_on_another_cycle, seek_from_settled},
 };
 
+constexpr int finer = 4; // times as many steps a period
+
 SettledBySteps by_steps(const SettledMotion& settled)
 {
   const std::vector<MeanValue>& exponents = settled.examined.exponents;
@@ -322,16 +325,18 @@ bool alike(const MeanValue& a, const MeanValue& b)
   return std::abs(a.value - b.value) <= a.error + b.error;
 }
 
-/// Whether more steps a period may change what the motion settled on: where "auto" chooses them for a small model,
-/// until a motion that settled on no cycle does as it did at the steps before. The grid of time alone can make a motion
-/// of impacts wander; it then diverges by the step, not by the period.
+/// Whether more steps a period may change what the motion settled on: where "auto" chooses them and a settled motion
+/// at these is affordable, until a motion that settled on no cycle does as it did at the steps before. The grid of time
+/// alone can make a motion of impacts wander; it then diverges by the step, not by the period.
 bool steps_may_decide(const MotionSearch& search)
 {
+  constexpr double of_settling = 512; // periods
   const Scene& scene = search.scene;
   const SettledMotion& settled = search.found.settled;
   const bool open = scene.fidelity == CycleModel::automatic && scene.cycle.steps_per_period == 0 &&
                     scene.cycle.start.kind != CycleStartKind::coarse;
-  if (!open || !has_run(settled.outcome) || !is_small(search.point)) return false;
+  const double of_period = finer * settled.steps_per_period * work_of_step(search.point.model->structure);
+  if (!open || !has_run(settled.outcome) || of_settling * of_period > affordable_work) return false;
   const SettledBySteps now = by_steps(settled);
   if (const std::optional<SettledBySteps>& before = search.by_fewer_steps)
     return before->kind != now.kind || !alike(before->energy, now.energy) || !alike(before->exponent, now.exponent);
@@ -341,7 +346,7 @@ bool steps_may_decide(const MotionSearch& search)
 /// Notes what the motion settled on, and takes four times the steps a period; false where the search has ended.
 bool takes_finer_steps(MotionSearch& search)
 {
-  constexpr int finer = 4, finest = 1024;
+  constexpr int finest = 1024;
   SettledMotion& settled = search.found.settled;
   if (search.ended || !steps_may_decide(search)) return false;
   search.begin_steps = finer * settled.steps_per_period;

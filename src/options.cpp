@@ -51,8 +51,8 @@ OptionList options_of(ProgramOptions& options)
       {"-transient_contact_solver", choice_of(contact.solver), Range::any,
        "block Gauss-Seidel, or the projection fixed point (fixed_point)"},
       {"-transient_contact_tolerance", &contact.tolerance, Range::positive,
-       "largest natural map of a pair over the largest reaction; beyond 10 000 degrees of freedom periods of shooting "
-       "that are still far from the cycle take up to 1e-6"},
+       "largest natural map of a pair over the largest reaction; dear periods of shooting that are still far from the "
+       "cycle take up to 1e-6"},
       {"-transient_contact_rho", &contact.rho, Range::below_two,
        "step of the fixed point over 1/lambda_max(W); 0: chosen by the program"},
       {"-cycle_samples", &options.cycle.samples, Range::natural,
@@ -68,15 +68,14 @@ OptionList options_of(ProgramOptions& options)
        "largest number of periods integrated freely while shooting finds no cycle that attracts"},
       {"-cycle_multipliers", &shooting.multipliers, Range::any,
        "columns of the exact tangent that the search for Floquet multipliers may take; 0: none; -1: as many as it "
-       "needs, within limits. A number forces that many Arnoldi steps, or bounds the search beside the oblique "
-       "projection"},
+       "needs, within limits. A number bounds the columns of the whole matrix or of a search"},
       {"-cycle_watched_periods", &shooting.watched_periods, Range::any,
        "periods integrated from beside the cycle found, 3 % of its fluctuation along the fastest motion, to see it "
        "grow or decay; again from a tenth and a hundredth of that where growth and multiplier differ; below 0: 200 "
-       "where the whole tangent of a small model does not decide, else none"},
+       "where a whole tangent does not decide, else none"},
       {"-settled_periods", &options.settled.periods, Range::not_negative,
        "largest number of periods integrated to see what a motion settles on where no cycle attracts; 0: 2048, or 512 "
-       "beyond 10 000 degrees of freedom"},
+       "where periods are dear"},
       {"-settled_exponents", &options.settled.exponents, Range::natural,
        "number of Lyapunov exponents of a settled motion"},
       {"-sweep_groups", &options.sweep.groups, Range::not_negative,

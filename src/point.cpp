@@ -1,6 +1,5 @@
 #include "squeal/point.hpp"
 
-#include "squeal/base/constants.hpp"
 #include "squeal/modes/modes_checkpoint.hpp"
 
 namespace squeal
@@ -125,13 +124,6 @@ std::string no_mode_to_follow(const SlidingPoint& point, const Scene& scene)
 bool seeks_modes(const Scene& scene)
 {
   return scene.modes.enabled || scene.cycle.enabled || follows_a_mode(scene.transient);
-}
-
-bool is_small(const SlidingPoint& point)
-{
-  PetscInt dofs = 0;
-  check(VecGetSize(point.model->structure.load, &dofs));
-  return dofs <= small_model;
 }
 
 Trajectory find_transient(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options)

@@ -1,5 +1,6 @@
 #include "squeal/studies.hpp"
 
+#include "squeal/base/cost.hpp"
 #include "squeal/swept_motion.hpp"
 
 #include <algorithm>
@@ -29,8 +30,10 @@ namespace
 /// the model cost little.
 bool may_lead_elsewhere(const SlidingPoint& point)
 {
+  constexpr double steps = 16. * 400 * 256; // of starts, periods each, steps a period
   const auto oscillates = [](const ComplexMode& mode) { return mode.frequency_hz() > 0; };
-  return is_small(point) && std::ranges::count_if(point.modes.unstable(), oscillates) > 1;
+  return steps * work_of_step(point.model->structure) <= affordable_work &&
+         std::ranges::count_if(point.modes.unstable(), oscillates) > 1;
 }
 
 /// The modes, their pairs and five random sums; as many as are integrated together at most.

@@ -20,7 +20,7 @@ MotionStart motion_start(const SlidingPoint& point, const Scene& scene, const Tr
                          const CoarseStart& coarse);
 
 /// Finds the cycle, and where none attracts the motion that is settled on. "auto" goes through the ways again at four
-/// times the steps a period, while these may decide on a small model.
+/// times the steps a period, while these may decide and are affordable.
 Motion find_motion(const SlidingPoint& point, const MotionStart& start, const Scene& scene,
                    const ProgramOptions& options, const StageRunner& run);
 

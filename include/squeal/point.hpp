@@ -40,9 +40,6 @@ std::string no_mode_to_follow(const SlidingPoint& point, const Scene& scene);
 /// Whether a stage of the scene needs the modes.
 bool seeks_modes(const Scene& scene);
 
-/// Whether it has up to small_model degrees of freedom.
-bool is_small(const SlidingPoint& point);
-
 /// Integrates the theta steps that the scene asks for, from its start.
 Trajectory find_transient(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options);
 

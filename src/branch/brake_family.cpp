@@ -132,6 +132,7 @@ FlowFamily BrakeFamily::flows()
   FlowFamily family;
   family.flow.M = problem_.sliding.structure.M;
   family.flow.K = problem_.sliding.structure.K;
+  family.flow.work = at_->flow.work;
   family.flow.integrate = [this](double period, Vec start, Vec end, Vec rate)
   { at_->flow.integrate(period, start, end, rate); };
   family.flow.record_period = [this](double period, Vec start, const TimeGrid& grid)

@@ -37,7 +37,7 @@ void refer_to(BranchCorrector& corrector, CorrectedOrbit& corrected)
 /// Steps along a branch.
 struct Walk
 {
-  BranchVector tangent; // of scaled length 1
+  BorderedVector tangent; // of scaled length 1
   double length, least, greatest;
 };
 
@@ -54,7 +54,7 @@ bool inside(const ContinuationSettings& settings, double parameter)
 }
 
 /// Takes out of a change what only begins the orbit later.
-void remove_shift(const BranchCorrector& corrector, const Orbit& orbit, BranchVector& change)
+void remove_shift(const BranchCorrector& corrector, const Orbit& orbit, BorderedVector& change)
 {
   const Flow& flow = corrector.family.flow;
   const double along = energy_product(flow, orbit.rate, change.state) / energy_product(flow, orbit.rate, orbit.rate);
@@ -66,7 +66,7 @@ std::optional<CorrectedOrbit> step_on(BranchCorrector& corrector, const Correcte
                                       double length)
 {
   const ContinuationSettings& settings = corrector.settings;
-  BranchVector predicted = vector_of(from);
+  BorderedVector predicted = vector_of(from);
   add(length, walk.tangent, predicted);
   if (!inside(settings, predicted.parameter))
   {
@@ -77,7 +77,7 @@ std::optional<CorrectedOrbit> step_on(BranchCorrector& corrector, const Correcte
   }
   std::optional<CorrectedOrbit> next = correct(corrector, predicted, walk.tangent);
   if (!next) return next;
-  BranchVector error = vector_of(*next);
+  BorderedVector error = vector_of(*next);
   add(-1, predicted, error);
   remove_shift(corrector, next->orbit, error);
   // far from the prediction another branch may have been met
@@ -87,9 +87,9 @@ std::optional<CorrectedOrbit> step_on(BranchCorrector& corrector, const Correcte
 }
 
 /// The direction from one orbit to the next, of scaled length 1 about the next.
-BranchVector direction_between(const BranchCorrector& corrector, const CorrectedOrbit& from, const CorrectedOrbit& to)
+BorderedVector direction_between(const BranchCorrector& corrector, const CorrectedOrbit& from, const CorrectedOrbit& to)
 {
-  BranchVector direction = vector_of(to);
+  BorderedVector direction = vector_of(to);
   add(-1, vector_of(from), direction);
   remove_shift(corrector, to.orbit, direction);
   scale(1 / std::sqrt(scaled_product(corrector, direction, direction)), direction);
@@ -195,7 +195,7 @@ double range_passed(const BranchCorrector& corrector, const BranchSide& side, bo
 }
 
 /// Follows the branch from its start in the direction of the tangent.
-BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, BranchVector tangent)
+BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, BorderedVector tangent)
 {
   const int points = corrector.settings.points;
   BranchSide side{{}, {}, known_beyond(start.multipliers)};
@@ -272,7 +272,7 @@ Branch joined(BranchSide backward, BranchSide forward)
   return branch;
 }
 
-BranchVector rising_parameter(const BranchCorrector& corrector, const Orbit& start)
+BorderedVector rising_parameter(const BranchCorrector& corrector, const Orbit& start)
 {
   return {zeros_like(start.state), 0, corrector.scales.parameter};
 }
@@ -338,12 +338,12 @@ Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settin
   ConvergenceLog log{progress, {}, 0.};
   BranchCorrector corrector{family, settings, options, log};
   corrector.scales.parameter = settings.greatest - settings.least;
-  const BranchVector rising = rising_parameter(corrector, start);
+  const BorderedVector rising = rising_parameter(corrector, start);
   std::optional<CorrectedOrbit> closed = correct_start(corrector, start, parameter);
   if (!closed) return without_start(log.convergence.periods);
   refer_to(corrector, *closed);
   ExaminedOrbit examined = examine(corrector, std::move(*closed), Examined::multipliers_too);
-  BranchVector tangent = tangent_at(corrector, examined.corrected, rising), back = copy_of(tangent);
+  BorderedVector tangent = tangent_at(corrector, examined.corrected, rising), back = copy_of(tangent);
   scale(-1, back);
   BranchSide backward = follow(corrector, examined, std::move(back));
   corrector.secants.clear();

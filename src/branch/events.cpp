@@ -71,9 +71,9 @@ std::optional<std::pair<double, double>> modulus_of(BranchEventKind kind, const 
 }
 
 /// z on the straight line between two orbits.
-BranchVector between(const BranchVector& from, const BranchVector& to, double part)
+BorderedVector between(const BorderedVector& from, const BorderedVector& to, double part)
 {
-  BranchVector z = copy_of(from);
+  BorderedVector z = copy_of(from);
   scale(1 - part, z);
   add(part, to, z);
   return z;
@@ -82,8 +82,8 @@ BranchVector between(const BranchVector& from, const BranchVector& to, double pa
 std::optional<CorrectedOrbit> correct_between(BranchCorrector& corrector, const ExaminedOrbit& from,
                                               const ExaminedOrbit& to, double part)
 {
-  const BranchVector a = vector_of(from.corrected), b = vector_of(to.corrected);
-  BranchVector normal = copy_of(b);
+  const BorderedVector a = vector_of(from.corrected), b = vector_of(to.corrected);
+  BorderedVector normal = copy_of(b);
   add(-1, a, normal);
   scale(1 / std::sqrt(scaled_product(corrector, normal, normal)), normal);
   return correct(corrector, between(a, b, part), normal);
@@ -162,7 +162,7 @@ double vertex(const std::array<double, 3>& s, const std::array<double, 3>& p)
 
 double distance(const BranchCorrector& corrector, const ExaminedOrbit& from, const ExaminedOrbit& to)
 {
-  BranchVector step = vector_of(to.corrected);
+  BorderedVector step = vector_of(to.corrected);
   add(-1, vector_of(from.corrected), step);
   return std::sqrt(scaled_product(corrector, step, step));
 }

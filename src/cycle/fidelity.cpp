@@ -4,10 +4,9 @@
 #include "reduced_cycle.hpp"
 #include "step_refinement.hpp"
 
-#include "squeal/base/run_control.hpp"
-
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace squeal
 {
@@ -34,24 +33,31 @@ std::string step_refusal_of(const CycleProblem& problem, int steps_per_period)
   return reason.empty() ? friction_refusal(problem.sliding, &mode, theta, h, problem.step, 1) : reason;
 }
 
-/// Refines the steps. Where the run is asked to end meanwhile, the cycle that was found stays.
-void refine_or_cut_short(const CycleCorrection& correction, LimitCycle& cycle)
+/// The reduced model's cycle itself, with its verdict and what one period of the full model says of it.
+LimitCycle measured_on_full_model(const CycleCorrection& correction, const ShootingStart& start)
 {
-  try
-  {
-    refine_steps(correction, cycle);
-  }
-  catch (const Interrupted&) // on all ranks alike
-  {
-    cycle.cut_short = true;
-    correction.fidelity.reason = format("the run was ended at %d steps a period", cycle.steps_per_period);
-  }
+  CycleSettings settings = correction.problem.settings;
+  CycleOptions options = correction.options;
+  settings.tolerance = std::numeric_limits<double>::max(); // no correction follows
+  options.shooting.finish = Finish::none;
+  options.shooting.max_periods = 1; // nor a motion beside it, which would not begin beside a cycle of the full model
+  LimitCycle cycle =
+      find_cycle_from(with_settings(correction.problem, settings), options, start, correction.preconditioner, 0);
+  cycle.tolerance = 0;
+  return cycle;
+}
+
+/// Notes the errors of a cycle whose steps are given.
+void note_model_errors(const CycleCorrection& correction, FittedCycle& found)
+{
+  const RelativeChange errors = model_errors_of(correction, found.cycle.orbit);
+  found.fidelity.frequency_error = errors.frequency;
+  found.fidelity.energy_error = errors.energy;
 }
 
 /// The full model's cycle from the reduced model's, whose derivative is the preconditioner, and the finer steps that
-/// the accuracy needs. Returns why there is none, or nothing.
-std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& reduced, StepChoice steps,
-                                  LimitCycle& cycle)
+/// the accuracy needs. It does not answer where that shooting left the reduced cycle.
+FittedCycle correct_on_full_model(const ReducedSearch& search, const ReducedCycle& reduced, StepChoice steps)
 {
   const CycleProblem& problem = search.problem;
   const Preconditioner preconditioner =
@@ -60,65 +66,81 @@ std::string correct_on_full_model(ReducedSearch& search, const ReducedCycle& red
   check(VecAXPY(displacement(state), 1, problem.sliding.equilibrium.u));
   ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), reduced.period};
   start.is_cycle = true;
-  const CycleCorrection correction{problem, search.options, preconditioner, search.fidelity};
-  if (search.fidelity.asked == CycleModel::reduced)
-  {
-    cycle = measure_reduced_cycle(correction, start);
-    return {};
-  }
-  cycle = problem.resumed ? find_cycle_from_resumed(problem, search.options, preconditioner)
-                          : find_cycle_from(problem, search.options, start, preconditioner, 0);
-  search.fidelity.full_periods = cycle.convergence.periods;
-  if (cycle.cut_short) return {};
-  if (cycle.outcome.kind == OutcomeKind::collapsed_to_equilibrium || cycle.outcome.kind == OutcomeKind::not_periodic)
-    return "the full model's shooting from the reduced model's cycle left it";
-  if (cycle.outcome.kind != OutcomeKind::converged) return {}; // the free motion went on from there
-  if (steps == StepChoice::by_accuracy)
-    refine_or_cut_short(correction, cycle);
+  const CycleCorrection correction{problem, search.options, preconditioner};
+  FittedCycle found{{}, search.fidelity};
+  LimitCycle& cycle = found.cycle;
+  const bool asked = found.fidelity.asked == CycleModel::reduced;
+  if (asked)
+    cycle = measured_on_full_model(correction, start);
+  else if (problem.resumed)
+    cycle = find_cycle_from_resumed(problem, search.options, preconditioner);
   else
-    estimate_model_errors(correction, cycle);
-  return {};
+    cycle = find_cycle_from(problem, search.options, start, preconditioner, 0);
+  found.fidelity.full_periods = cycle.convergence.periods;
+  if (cycle.cut_short) return found;
+  const OutcomeKind kind = cycle.outcome.kind;
+  found.answers = asked || (kind != OutcomeKind::collapsed_to_equilibrium && kind != OutcomeKind::not_periodic);
+  if (!found.answers) found.fidelity.reason = "the full model's shooting from the reduced model's cycle left it";
+  if (kind == OutcomeKind::converged && steps == StepChoice::by_accuracy && !asked)
+    return refine_steps(correction, std::move(found));
+  if (asked || kind == OutcomeKind::converged) note_model_errors(correction, found); // else the free motion went on
+  return found;
 }
 
 constexpr const char* several_modes = "several modes are unstable: only the full model's shooting excites them all";
 
-/// The cycle by way of the reduced model's. Returns why there is none, or nothing.
-std::string find_by_reduced_model(ReducedSearch& search, StepChoice steps, LimitCycle& cycle)
+/// No cycle of the reduced model, for a reason: the full model follows unless the reduced one was asked for.
+FittedCycle without_cycle(const ReducedSearch& search, const std::string& reason)
 {
-  if (search.problem.unstable.modes.size() > 1) return several_modes;
+  FittedCycle none{{}, search.fidelity, search.fidelity.asked == CycleModel::reduced};
+  none.fidelity.reason = reason;
+  const bool several = search.problem.unstable.modes.size() > 1;
+  none.cycle.outcome = {several ? OutcomeKind::refused : OutcomeKind::not_converged, reason, 0, 0};
+  none.cycle.orbit.residual = std::nan(""); // no period of the full model was made
+  return none;
+}
+
+/// The cycle by way of the reduced model's.
+FittedCycle find_by_reduced_model(ReducedSearch& search, StepChoice steps)
+{
+  if (search.problem.unstable.modes.size() > 1) return without_cycle(search, several_modes);
   ReducedCycle reduced;
-  if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty()) return reason;
+  if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty())
+    return without_cycle(search, reason);
   const double clock = MPI_Wtime();
-  const std::string reason = correct_on_full_model(search, reduced, steps, cycle);
-  search.fidelity.full_seconds += MPI_Wtime() - clock;
-  const bool converged = search.fidelity.asked == CycleModel::reduced || cycle.outcome.kind == OutcomeKind::converged;
-  if (converged && steps == StepChoice::given && !cycle.cut_short) estimate_reduced_step_errors(search, reduced);
-  return reason;
+  FittedCycle found = correct_on_full_model(search, reduced, steps);
+  found.fidelity.full_seconds += MPI_Wtime() - clock;
+  search.fidelity = found.fidelity;
+  if (!found.answers) return without_cycle(search, found.fidelity.reason);
+  const bool converged =
+      search.fidelity.asked == CycleModel::reduced || found.cycle.outcome.kind == OutcomeKind::converged;
+  if (converged && steps == StepChoice::given && !found.cycle.cut_short) estimate_reduced_step_errors(search, reduced);
+  found.fidelity = search.fidelity;
+  return found;
 }
 
 /// Lets `search` find the cycle with the chosen settings, unless these are refused. A cycle that answers is saved.
-template <class Search> FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request,
-                                                      const Fidelity& tried, const Search& search)
+FittedCycle
+find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, Fidelity fidelity,
+                  const std::function<FittedCycle(const CycleProblem&, StepChoice, const Fidelity&)>& search)
 {
   declare_solver_options(comm_of(given.sliding.structure.load));
-  FittedCycle result;
   const CycleSettings settings = chosen_settings(given, request);
   const CycleProblem problem = with_settings(given, settings);
   if (const std::string refusal = step_refusal_of(problem, settings.steps_per_period); !refusal.empty())
   {
-    result.cycle.outcome = {OutcomeKind::refused, refusal, 0, 0};
-    return result;
+    FittedCycle refused;
+    refused.cycle.outcome = {OutcomeKind::refused, refusal, 0, 0};
+    return refused;
   }
-  Fidelity& fidelity = result.fidelity;
-  fidelity = tried;
   fidelity.asked = request.model;
   fidelity.accuracy = request.accuracy;
   if (request.model != CycleModel::full) fidelity.contact_tolerance = 1e-3 * request.accuracy;
   fidelity.verdict_steps = settings.steps_per_period;
   const bool open = request.model == CycleModel::automatic && given.settings.steps_per_period == 0;
-  search(problem, open ? StepChoice::by_accuracy : StepChoice::given, result);
+  FittedCycle result = search(problem, open ? StepChoice::by_accuracy : StepChoice::given, fidelity);
   if (!result.answers) return result;
-  fidelity.steps_per_period = result.cycle.steps_per_period;
+  result.fidelity.steps_per_period = result.cycle.steps_per_period;
   const State& start = result.cycle.measured.start;
   const std::filesystem::path& file = settings.save_state;
   if (!file.empty() && start.u.get()) write_state(start, problem.sliding.structure, file);
@@ -153,16 +175,15 @@ std::string no_reduced_search(const CycleProblem& problem)
 FittedCycle find_on_reduced_model(const CycleProblem& given, const FidelityRequest& request,
                                   const CycleOptions& options)
 {
-  const bool asked = request.model == CycleModel::reduced;
-  const auto search = [&](const CycleProblem& problem, StepChoice steps, FittedCycle& result)
+  const auto search = [&](const CycleProblem& problem, StepChoice steps, const Fidelity& fidelity)
   {
-    Fidelity& fidelity = result.fidelity;
-    fidelity.used = CycleModel::reduced;
+    const bool asked = fidelity.asked == CycleModel::reduced;
     ReducedSearch reduced{problem, options, fidelity, problem.settings.steps_per_period};
+    reduced.fidelity.used = CycleModel::reduced;
     reduced.tolerance = asked ? 3e-4 * fidelity.accuracy : 1e-3; // a start need not be better; slow motions multiply it
     try
     {
-      fidelity.reason = find_by_reduced_model(reduced, steps, result.cycle);
+      return find_by_reduced_model(reduced, steps);
     }
     catch (const LibraryError&) // perhaps on this rank alone
     {
@@ -171,13 +192,8 @@ FittedCycle find_on_reduced_model(const CycleProblem& given, const FidelityReque
     catch (const Error& error) // on every rank alike: the reduced model is the same on all
     {
       if (asked) throw;
-      fidelity.reason = error.what();
+      return without_cycle(reduced, error.what());
     }
-    if (fidelity.reason.empty()) return;
-    result.answers = asked;
-    result.cycle.outcome.kind = problem.unstable.modes.size() > 1 ? OutcomeKind::refused : OutcomeKind::not_converged;
-    result.cycle.outcome.reason = fidelity.reason;
-    result.cycle.orbit.residual = std::nan(""); // no period of the full model was made
   };
   return find_fitted_cycle(given, request, {}, search);
 }
@@ -185,20 +201,20 @@ FittedCycle find_on_reduced_model(const CycleProblem& given, const FidelityReque
 FittedCycle find_on_full_model(const CycleProblem& given, const FidelityRequest& request, const CycleOptions& options,
                                const Fidelity& tried)
 {
-  const auto search = [&](const CycleProblem& problem, StepChoice steps, FittedCycle& result)
+  const auto search = [&](const CycleProblem& problem, StepChoice steps, const Fidelity& fidelity)
   {
     const double clock = MPI_Wtime();
-    Fidelity& fidelity = result.fidelity;
-    fidelity.used = CycleModel::full;
-    result.cycle = find_cycle_from_start(problem, options);
-    result.cycle.convergence.periods += fidelity.full_periods; // of a search that stalled
-    fidelity.full_periods = result.cycle.convergence.periods;
-    if (steps == StepChoice::by_accuracy && !result.cycle.cut_short)
+    FittedCycle found{find_cycle_from_start(problem, options), fidelity};
+    found.fidelity.used = CycleModel::full;
+    found.cycle.convergence.periods += fidelity.full_periods; // of a search that stalled
+    found.fidelity.full_periods = found.cycle.convergence.periods;
+    if (steps == StepChoice::by_accuracy && !found.cycle.cut_short)
     {
       const Preconditioner preconditioner = estimated_preconditioner(problem, options.band_factor);
-      refine_or_cut_short({problem, options, preconditioner, fidelity}, result.cycle);
+      found = refine_steps({problem, options, preconditioner}, std::move(found));
     }
-    fidelity.full_seconds += MPI_Wtime() - clock;
+    found.fidelity.full_seconds += MPI_Wtime() - clock;
+    return found;
   };
   return find_fitted_cycle(given, request, tried, search);
 }

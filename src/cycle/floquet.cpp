@@ -3,6 +3,7 @@
 #include "preconditioner.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "squeal/cycle/reduced_flow.hpp"
 #include "squeal/cycle/reduced_spectrum.hpp"
@@ -231,7 +232,7 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   // more pairs may be closed than the shapes can tell apart (section 7.2)
   for (Index i = 0; i < model->of_left_out.size(); ++i)
     model->compliance[static_cast<std::size_t>(i)] += model->of_left_out(i);
-  if (is_large(problem.sliding.structure)) return_freed_memory(); // of the factor that gave the attachments
+  return_freed_memory(); // of the factor that gave the attachments
   return model;
 }
 
@@ -336,22 +337,24 @@ Preconditioner recorded_preconditioner(const CycleProblem& problem, const Period
 
 int steps_to_compare(const Structure& structure, int steps)
 {
-  return is_large(structure) && steps <= enough_steps ? 2 * steps : 0;
+  return is_dear(steps * work_of_step(structure)) && steps <= enough_steps ? 2 * steps : 0;
 }
 
-FloquetAnalysis examine(const CycleProblem& problem, const CycleOptions& options, const PeriodMap& map,
-                        const Orbit& orbit)
+Verdict examine(const CycleProblem& problem, const CycleOptions& options, const LimitCycle& cycle)
 {
-  PeriodMap examined{map.sliding, map.options, std::min(map.steps, enough_steps), map.theta};
-  examined.reactions = map.reactions;
-  Flow flow = flow_of(examined);
-  add_slow_motions(problem, examined,
-                   map.steps > enough_steps ? map.steps : steps_to_compare(map.sliding.structure, map.steps), flow);
-  const Vec u0 = problem.sliding.equilibrium.u;
+  const int steps = cycle.steps_per_period;
+  PeriodMap map{problem.sliding, problem.step, std::min(steps, enough_steps), cycle.theta};
+  map.reactions = problem.sliding.equilibrium.reactions;
+  Flow flow = flow_of(map);
+  add_slow_motions(problem, map, steps > enough_steps ? steps : steps_to_compare(problem.sliding.structure, steps),
+                   flow);
+  const Orbit& orbit = cycle.orbit;
   const Preconditioner none;
-  const OrbitProblem found = problem_of(
-      flow, none, {u0, displacement(orbit.state), velocity(orbit.state), orbit.period}, problem.settings.tolerance);
-  return find_multipliers(found, options.shooting, orbit, other_unstable_states(problem));
+  const OrbitProblem found = problem_of(flow, none, {problem.sliding.equilibrium.u, nullptr, nullptr, orbit.period},
+                                        problem.settings.tolerance);
+  Progress progress(comm_of(orbit.state), "cycle, verdict", 1);
+  ConvergenceLog log{progress};
+  return judge(found, options.shooting, log, orbit, other_unstable_states(problem));
 }
 
 } // namespace squeal

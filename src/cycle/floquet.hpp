@@ -15,11 +15,11 @@ void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_ste
 /// Error: as of reduce.
 Preconditioner recorded_preconditioner(const CycleProblem& problem, const PeriodMap& map, double period, Vec rate);
 
-/// The number of steps a period that tells the error of another: twice as many of a large model with few, else 0.
+/// The number of steps a period that tells the error of another: twice as many of few where periods are dear and no
+/// verdict at finer steps follows, else 0. Collective.
 int steps_to_compare(const Structure& structure, int steps);
 
-/// Of a converged cycle of the map, by at most 128 steps a period: what the others change is in the bars.
-FloquetAnalysis examine(const CycleProblem& problem, const CycleOptions& options, const PeriodMap& map,
-                        const Orbit& orbit);
+/// The verdict on a converged cycle, by at most 128 steps a period: what the others change is in the bars.
+Verdict examine(const CycleProblem& problem, const CycleOptions& options, const LimitCycle& cycle);
 
 } // namespace squeal

@@ -3,6 +3,7 @@
 #include "floquet.hpp"
 #include "preconditioner.hpp"
 
+#include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/cycle/cycle_checkpoint.hpp"
 
@@ -47,7 +48,7 @@ template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, con
   const CycleSettings& settings = problem.settings;
   PeriodMap map{problem.sliding, problem.step, settings.steps_per_period, settings.theta};
   map.reactions = problem.sliding.equilibrium.reactions;
-  map.keeps_step = is_large(problem.sliding.structure);
+  map.keeps_step = is_dear(map.steps * work_of_step(problem.sliding.structure));
   Flow flow = flow_of(map);
   add_slow_motions(problem, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
   CycleKeeper keeper(problem.sliding.structure);

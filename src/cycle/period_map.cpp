@@ -198,6 +198,7 @@ Flow flow_of(PeriodMap& map)
   const auto integrate = [&map](double period, Vec start, Vec end, Vec rate)
   { integrate_period(map, period, start, end, rate); };
   Flow flow{integrate, map.sliding.structure.M, map.sliding.structure.K};
+  flow.work = map.steps * work_of_step(map.sliding.structure);
   add_tangent(map, flow);
   return flow;
 }

@@ -2,6 +2,7 @@
 
 #include "floquet.hpp"
 #include "preconditioner.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
 #include "step_refinement.hpp"
 
@@ -46,7 +47,7 @@ double mean_energy(ReducedMap& map, double period, const ReducedState& start)
 }
 
 /// Notes what the reduced model consists of.
-void describe_model(const ReducedSearch& search)
+void describe_model(ReducedSearch& search)
 {
   Fidelity& fidelity = search.fidelity;
   fidelity.size = search.model.size();
@@ -67,7 +68,8 @@ void describe_model(const ReducedSearch& search)
 double highest_joining(const ReducedSearch& search)
 {
   constexpr int long_period = 128; // steps
-  const double factor = is_large(search.problem.sliding.structure) && search.steps < long_period ? 3 : 4.5;
+  const bool dear = is_dear(search.steps * work_of_step(search.problem.sliding.structure));
+  const double factor = dear && search.steps < long_period ? 3 : 4.5;
   return factor * search.problem.unstable.modes.front().frequency_hz();
 }
 
@@ -301,9 +303,10 @@ void estimate_reduced_step_errors(ReducedSearch& search, const ReducedCycle& cyc
 {
   Fidelity& fidelity = search.fidelity;
   const ReducedCycle twice = find_reduced_cycle(search, cycle, 2 * search.steps);
-  estimate_step_errors(fidelity,
-                       {{2 * search.steps, twice.period, twice.energy}, {search.steps, cycle.period, cycle.energy}});
-  if (!twice.converged) fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
+  const RelativeChange errors =
+      step_errors_of({{2 * search.steps, twice.period, twice.energy}, {search.steps, cycle.period, cycle.energy}});
+  fidelity.step_frequency_error = twice.converged ? errors.frequency : std::nan("");
+  fidelity.step_energy_error = twice.converged ? errors.energy : std::nan("");
 }
 
 std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)

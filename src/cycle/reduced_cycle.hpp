@@ -11,7 +11,7 @@ struct ReducedSearch
 {
   const CycleProblem& problem;
   const CycleOptions& options;
-  Fidelity& fidelity;
+  Fidelity fidelity;    // gains periods, errors and the account of the model
   int steps = 0;        // a period
   double tolerance = 0; // on the residual of the reduced model's cycles
   RealModes real{};     // of the basis

@@ -1,7 +1,8 @@
 #pragma once
-/// Cycles of the full model near one that is known (src/README.md, section 7.8). They have as many steps a period as
-/// the accuracy needs, or one period shows how far another model's cycle is off.
+/// Cycles of the full model near one that is known, at as many steps a period as the accuracy needs (src/README.md,
+/// section 7.8).
 #include "squeal/cycle/fidelity.hpp"
+#include "squeal/shooting/multisecant.hpp"
 
 namespace squeal
 {
@@ -12,19 +13,15 @@ struct CycleCorrection
   const CycleProblem& problem;
   const CycleOptions& options;
   const Preconditioner& preconditioner;
-  Fidelity& fidelity; // gains the errors and the periods
 };
 
 /// Takes a converged cycle to twice as many steps a period; where these are still too few, to as many as the errors of
-/// both foretell. Where the accuracy is not reached, the finest cycle stands with its errors, and `fidelity.reason`
-/// says so.
-void refine_steps(const CycleCorrection& correction, LimitCycle& cycle);
+/// both foretell. Where the accuracy is not reached, the finest cycle stands with its errors, and its reason says so.
+/// Where the run is asked to end meanwhile, the cycle that was found stays.
+FittedCycle refine_steps(const CycleCorrection& correction, FittedCycle found);
 
 /// The errors of a converged cycle whose steps are given: what one further step of the iteration would change.
-void estimate_model_errors(const CycleCorrection& correction, const LimitCycle& cycle);
-
-/// One period of the full model from the cycle of another, which gives that one's errors.
-LimitCycle measure_reduced_cycle(const CycleCorrection& correction, const ShootingStart& start);
+RelativeChange model_errors_of(const CycleCorrection& correction, const Orbit& orbit);
 
 /// A cycle at some number of steps a period.
 struct CycleAtSteps
@@ -34,6 +31,6 @@ struct CycleAtSteps
 };
 
 /// Errors of the last of two cycles, of first order, or of the last of three and more, of both orders.
-void estimate_step_errors(Fidelity& fidelity, const std::vector<CycleAtSteps>& cycles);
+RelativeChange step_errors_of(const std::vector<CycleAtSteps>& cycles);
 
 } // namespace squeal

@@ -1,5 +1,6 @@
 #include "squeal/settled/settled_motion.hpp"
 
+#include "squeal/base/cost.hpp"
 #include "squeal/base/mean.hpp"
 #include "squeal/base/run_control.hpp"
 
@@ -204,7 +205,8 @@ void take_as_answer(const SettledMotion& motion, Outcome& of_cycle)
 
 SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, SettledOptions options)
 {
-  if (options.periods == 0) options.periods = is_large(problem.sliding.structure) ? 512 : 2048;
+  const double of_period = cycle.steps_per_period * work_of_step(problem.sliding.structure);
+  if (options.periods == 0) options.periods = is_dear(of_period) ? 512 : 2048;
   SettledMotion motion;
   PeriodMap map{problem.sliding, problem.step, cycle.steps_per_period, cycle.theta};
   map.reactions = problem.sliding.equilibrium.reactions;

@@ -11,6 +11,7 @@ namespace squeal
 namespace
 {
 
+using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
@@ -18,7 +19,6 @@ constexpr Index of_motions = 4, at_random = 2; // columns of a block
 // Few powers of few motions may be bounded where another one grows: the residual of a Ritz value says nothing of what
 // the space has not. Four blocks have seen what every motion of a random start becomes in four periods.
 constexpr long least_blocks = 4;
-constexpr double ritz_settled = 1e-3; // residual of a value that the projection may go on from
 
 /// The motions that are least in V, and random velocities, in which every mode has its part.
 StateBlock start_beside(const Monodromy& monodromy, const Projector& projector, const std::vector<Owned<Vec>>& motions)
@@ -42,23 +42,27 @@ StateBlock start_beside(const Monodromy& monodromy, const Projector& projector, 
   return start;
 }
 
-/// Bounds the largest Ritz pair of H on Q. `remainder`: of the last block's image, whose columns are the last ones of
-/// H.
-void bound_ritz(const StateBlock& Q, const MatrixXd& H, const MatrixXd& remainder, DeflatedSearch& search)
+/// Whether the images of the space lie in it, so that its pairs are exact.
+bool is_invariant(const MatrixXd& remainder, const MatrixXd& along)
 {
-  const DenseEigenpair pair = solve_dense_unsymmetric(H).front();
-  search.largest = pair.lambda;
-  search.residual = (remainder * pair.y.tail(remainder.cols())).norm();
-  search.bounded = std::abs(pair.lambda) + search.residual < 1;
-  search.vector.reset();
-  if (search.bounded) return;
-  search.vector = combination(Q, parts_of(pair.y));
+  constexpr double rounding = 1e-12;
+  return remainder.rows() == 0 || remainder.norm() <= rounding * along.norm();
+}
+
+/// Sets the pair that is sought among those of H. `remainder`: of the last block's image, whose columns are the last
+/// ones of H.
+void set_pair(const MatrixXd& H, const MatrixXd& remainder, const SearchChoice& choice, DeflatedSearch& search)
+{
+  const std::vector<DenseEigenpair> pairs = solve_dense_unsymmetric(H);
+  search.pair = pairs[choice.place(pairs, search.Q)];
+  search.residual = (remainder * search.pair.y.tail(remainder.cols())).norm();
+  search.bounded = std::abs(search.pair.lambda) + search.residual < 1;
 }
 
 } // namespace
 
 DeflatedSearch search_beside(const Monodromy& monodromy, const Projector& projector,
-                             const std::vector<Owned<Vec>>& motions, Index columns)
+                             const std::vector<Owned<Vec>>& motions, Index columns, const SearchChoice& choice)
 {
   const Flow& flow = monodromy.flow;
   DeflatedSearch search;
@@ -67,38 +71,85 @@ DeflatedSearch search_beside(const Monodromy& monodromy, const Projector& projec
   StateBlock block = orthonormal(flow, start_beside(monodromy, projector, motions), 1e-6);
   search.bounded = block.columns() == 0;
   if (search.bounded) return search;
-  StateBlock Q = block;
-  long blocks = 0;
+  search.Q = block;
   MatrixXd H(0, 0);
-  while (search.columns + block.columns() <= columns)
+  for (long blocks = 1;; ++blocks)
   {
     StateBlock image = image_of(monodromy, block);
     search.columns += static_cast<long>(image.columns());
     deflate(projector, image);
-    const StateBlock images = energy_images(flow, Q);
-    MatrixXd along = MatrixXd::Zero(Q.columns(), block.columns());
+    const StateBlock images = energy_images(flow, search.Q);
+    MatrixXd along = MatrixXd::Zero(search.Q.columns(), block.columns());
     for (int pass = 0; pass < 2; ++pass)
     {
       const MatrixXd more = inner_products(images, image);
-      subtract(image, Q, more);
+      subtract(image, search.Q, more);
       along += more;
     }
-    MatrixXd grown = MatrixXd::Zero(Q.columns(), Q.columns());
+    MatrixXd grown = MatrixXd::Zero(search.Q.columns(), search.Q.columns());
     grown.topLeftCorner(H.rows(), H.cols()) = H;
     grown.rightCols(block.columns()) = along;
+    H = std::move(grown);
     block = orthonormal(flow, image, 1e-8);
     const MatrixXd remainder = inner_products(block, energy_images(flow, image));
-    H = std::move(grown);
-    bound_ritz(Q, H, remainder, search);
-    const bool converged = search.residual < ritz_settled;
-    if (++blocks >= least_blocks && (search.bounded || converged)) return search;
-    if (block.columns() == 0) return search;
+    set_pair(H, remainder, choice, search);
+    if (is_invariant(remainder, along) || (blocks >= least_blocks && choice.ends(search))) return search;
+    if (search.columns + block.columns() > columns) return search;
     // the next block's columns see what this one adds to them
     H.conservativeResizeLike(MatrixXd::Zero(H.rows() + remainder.rows(), H.cols()));
     H.bottomRightCorner(remainder.rows(), remainder.cols()) = remainder;
-    append(Q, block);
+    append(search.Q, block);
   }
-  return search;
+}
+
+FloquetAnalysis multipliers_by_search(const Monodromy& monodromy, const std::vector<Owned<Vec>>& motions, Index columns)
+{
+  const Flow& flow = monodromy.flow;
+  const Orbit& orbit = monodromy.orbit;
+  FloquetAnalysis result;
+  Multipliers& multipliers = result.multipliers;
+  multipliers.method = MultiplierMethod::arnoldi;
+  const Owned<Vec> rate = copy_of(orbit.rate.get());
+  const StateBlock rate_image = energy_images(flow, block_of(std::span(&rate, 1)));
+  double shift_distance = 0;
+  const auto beside_shift = [&](const std::vector<DenseEigenpair>& pairs, const StateBlock& Q) -> std::size_t
+  {
+    const std::size_t shift = find_shift(pairs, inner_products(Q, rate_image).col(0));
+    shift_distance = std::abs(pairs[shift].lambda - 1.);
+    return shift == 0 && pairs.size() > 1 ? 1 : 0;
+  };
+  const auto settled = [](const DeflatedSearch& search)
+  { return search.residual < 0.1 * std::abs(std::abs(search.pair.lambda) - 1); };
+  const auto search_on = [&](const TimeGrid& grid)
+  {
+    flow.record_period(orbit.period, orbit.state, grid);
+    const StateBlock none{empty_multivector(flow.M), empty_multivector(flow.M)};
+    DeflatedSearch search = search_beside(monodromy, {none, none}, motions, columns, {beside_shift, settled});
+    multipliers.periods += search.columns;
+    return search;
+  };
+  const DeflatedSearch found = search_on({});
+  multipliers.trivial_error = shift_distance;
+  const Complex largest = found.pair.lambda;
+  GridErrors errors(1);
+  for (const auto& [grid, part] : other_grids)
+  {
+    const DeflatedSearch other = search_on(grid);
+    add_changes({largest}, {other.pair.lambda, std::conj(other.pair.lambda)}, part, errors);
+    for (std::vector<double>* bar : {&errors.errors, &errors.rises}) bar->front() += part * other.residual;
+  }
+  flow.record_period(orbit.period, orbit.state, {});
+  const double own = std::max(2 * found.residual, 1e-9); // rounding
+  multipliers.values = {largest};
+  if (largest.imag() != 0) multipliers.values.push_back(std::conj(largest));
+  multipliers.errors.assign(multipliers.values.size(), own + errors.errors.front());
+  multipliers.upper.assign(multipliers.values.size(), std::abs(largest) + own + errors.rises.front());
+  decide(multipliers,
+         {settled(found), "the largest multiplier has not converged: a larger -cycle_multipliers would decide"});
+  const auto combined = [&](const Eigen::VectorXd& y)
+  { return std::move(states_of(combination(found.Q, y), orbit.state).front()); };
+  result.fastest = fastest_motion(flow, found.pair, combined);
+  return result;
 }
 
 } // namespace squeal

@@ -2,24 +2,34 @@
 /// The largest Ritz values of (1 - V (W'V)^-1 W') dPhi_T/dx, in a block Arnoldi space (src/README.md, section 6.9).
 #include "oblique_projector.hpp"
 
-#include <optional>
-
 namespace squeal
 {
 
-/// What the search beside V found.
+/// The Ritz pair that was sought.
 struct DeflatedSearch
 {
-  bool bounded = false;             // its largest Ritz value is below 1 by more than its residual
-  std::complex<double> largest = 0; // that value
-  double residual = 0;              // of that value
-  std::optional<StateBlock> vector; // of that value, real and imaginary part; where it is not bounded
-  long columns = 0;                 // products with the monodromy matrix
+  bool bounded = false;  // its value is below 1 by more than its residual
+  DenseEigenpair pair{}; // its vector in the coordinates of Q; without entries: there is none
+  double residual = 0;   // of that pair
+  StateBlock Q{};        // energy-orthonormal
+  long columns = 0;      // products with the monodromy matrix
 };
 
-/// Searches from the motions that are least in V, with at most `columns` columns, until the largest Ritz value is
-/// bounded. Without motions V holds every motion that may decay slowly. Collective.
+/// How the largest pair is told from those that are not sought, and when the search ends.
+struct SearchChoice
+{
+  std::function<std::size_t(const std::vector<DenseEigenpair>& pairs, const StateBlock& Q)> place;
+  std::function<bool(const DeflatedSearch&)> ends; // asked after four blocks
+};
+
+/// Searches from the motions that are least in V, with at most `columns` columns beyond the first block. Without
+/// motions V holds every motion that may decay slowly. Collective.
 DeflatedSearch search_beside(const Monodromy& monodromy, const Projector& projector,
-                             const std::vector<Owned<Vec>>& motions, Eigen::Index columns);
+                             const std::vector<Owned<Vec>>& motions, Eigen::Index columns, const SearchChoice& choice);
+
+/// The largest multiplier, sought from motions that may grow. Bars: twice the residual of its Ritz pair and what other
+/// grids of time change it by. Leaves the period recorded on its own grid. Collective.
+FloquetAnalysis multipliers_by_search(const Monodromy& monodromy, const std::vector<Owned<Vec>>& motions,
+                                      Eigen::Index columns);
 
 } // namespace squeal

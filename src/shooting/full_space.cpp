@@ -1,7 +1,7 @@
 #include "squeal/shooting/full_space.hpp"
 
-#include "exact_newton.hpp"
 #include "free_periods.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/shooting/multisecant.hpp"
 
 namespace squeal
@@ -11,8 +11,8 @@ StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& optio
 {
   if (start.residual <= problem.tolerance) return {std::move(start), StageEnding::converged};
   if (options.finish == Finish::none) return {std::move(start), StageEnding::stalled};
-  if (has_small_tangent(problem)) return shoot_by_exact_newton(problem, options, log, start);
   Multisecant memory;
+  memory.exact = problem.flow.apply_tangent && whole_tangent_is_cheap(2. * dofs_of(problem.equilibrium));
   return shoot_by_multisecant(problem, options, log, memory, start);
 }
 

@@ -69,7 +69,7 @@ Crossing crossing_of(std::complex<double> multiplier)
   return multiplier.real() < 0 ? Crossing::period_doubling : Crossing::fold;
 }
 
-void decide(Multipliers& multipliers, const Completeness& coverage, std::size_t converged)
+void decide(Multipliers& multipliers, const Completeness& coverage)
 {
   multipliers.complete = coverage.complete;
   multipliers.stability = coverage.complete ? Stability::stable : Stability::undecided;
@@ -85,7 +85,7 @@ void decide(Multipliers& multipliers, const Completeness& coverage, std::size_t 
       multipliers.would_decide.clear();
       return;
     }
-    if (i >= converged || multipliers.upper_bound(i) < 1 || multipliers.stability == Stability::undecided) continue;
+    if (multipliers.upper_bound(i) < 1 || multipliers.stability == Stability::undecided) continue;
     multipliers.stability = Stability::undecided;
     multipliers.would_decide =
         format("a multiplier of %.6f with an error of %.1e reaches across 1: a smaller tolerance "

@@ -56,9 +56,8 @@ struct Completeness
 /// How an orbit lost its stability by this multiplier.
 Crossing crossing_of(std::complex<double> multiplier);
 
-/// Says what the bars allow. Only the `converged` largest values can leave it undecided: an Arnoldi space always holds
-/// smaller ones that have not converged.
-void decide(Multipliers& multipliers, const Completeness& coverage, std::size_t converged);
+/// Says what the bars allow.
+void decide(Multipliers& multipliers, const Completeness& coverage);
 
 /// By oblique projection on approximate right and left vectors (src/README.md, section 6.9). `columns`: at most for the
 /// search beside them. Nothing, with the reason in `refusal`, where these vectors do not serve.

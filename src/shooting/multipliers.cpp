@@ -1,7 +1,8 @@
 #include "squeal/shooting/multipliers.hpp"
 
-#include "arnoldi_multipliers.hpp"
+#include "deflated_search.hpp"
 #include "squeal/base/constants.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/progress.hpp"
 #include "whole_matrix.hpp"
 
@@ -17,14 +18,15 @@ namespace
 using Complex = std::complex<double>;
 using Eigen::Index;
 
-/// The sum of a change of amplitude and the other unstable motions, each of energy norm 1.
-Owned<Vec> motions_that_may_grow(const OrbitProblem& problem, const Orbit& orbit,
-                                 const std::vector<Owned<Vec>>& other_unstable)
+/// A change of amplitude, the flow, and the other unstable motions.
+std::vector<Owned<Vec>> motions_that_may_grow(const OrbitProblem& problem, const Orbit& orbit,
+                                              const std::vector<Owned<Vec>>& other_unstable)
 {
-  Owned<Vec> start = fluctuation_of(problem, orbit);
-  normalise(problem.flow, start);
-  for (const Owned<Vec>& motion : other_unstable) check(VecAXPY(start, 1 / energy_norm(problem.flow, motion), motion));
-  return start;
+  std::vector<Owned<Vec>> motions;
+  motions.push_back(fluctuation_of(problem, orbit));
+  motions.push_back(copy_of(orbit.rate.get()));
+  for (const Owned<Vec>& motion : other_unstable) motions.push_back(copy_of(motion.get()));
+  return motions;
 }
 
 /// The multipliers of these places along eight periods on a grid of 8 N + 1 steps, by projection on the vectors of all
@@ -134,7 +136,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   }
   pairs.erase(pairs.begin() + static_cast<std::ptrdiff_t>(shift));
   if (pairs.empty()) return result;
-  decide(multipliers, {true, ""}, multipliers.values.size());
+  decide(multipliers, {true, ""});
   if (multipliers.stability == Stability::undecided &&
       largest_trivial_error > 0.5 * multipliers.errors[deciding_place(multipliers)])
     multipliers.would_decide = format(
@@ -149,7 +151,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
 
 constexpr PetscInt columns_of_whole = 200; // at most, as many as a projection and the search beside it take
 
-/// How the multipliers of a system of so many degrees of freedom are found.
+/// The cheapest way by the columns that it takes.
 MultiplierMethod chosen_method(const ShootingOptions& options, PetscInt dofs)
 {
   if (options.multiplier_method != MultiplierMethod::automatic) return options.multiplier_method;
@@ -182,35 +184,35 @@ bool largest_reaches_across(const Multipliers& multipliers)
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable)
 {
+  const bool dear = is_dear(problem.flow.work);
+  const PetscInt enough = dear ? 24 : 96; // columns of a search
   if (options.multipliers == 0) return {};
-  const PetscInt dofs = dofs_of(orbit.state);
+  const PetscInt dofs = dofs_of(orbit.state), columns = options.multipliers > 0 ? options.multipliers : enough;
   Monodromy monodromy{problem.flow, orbit};
-  const MultiplierMethod method = chosen_method(options, dofs);
-  if (method == MultiplierMethod::whole) return from_whole_matrix(monodromy, dofs);
   std::optional<Progress> progress;
-  if (dofs > large_model)
+  constexpr double expected_columns = 100;
+  if (dear)
   {
-    constexpr double expected_columns = 100;
     progress.emplace(comm_of(orbit.state), "multipliers", expected_columns);
-    progress->update(0, "a reduced model on the cycle's contact");
-    monodromy.after_product = [&, done = 0.](std::size_t columns) mutable
+    monodromy.after_product = [&, done = 0.](std::size_t more) mutable
     {
-      done += static_cast<double>(columns);
+      done += static_cast<double>(more);
       progress->update(done, format("%.0f products with the period's tangent", done));
     };
   }
+  const MultiplierMethod method = chosen_method(options, dofs);
+  if (method == MultiplierMethod::whole) return from_whole_matrix(monodromy, dofs);
   std::string refusal;
   std::optional<FloquetAnalysis> projected;
   if (method == MultiplierMethod::oblique && problem.flow.slow_motions)
     projected = multipliers_by_projection(monodromy, options.multipliers, refusal);
-  // of a large model an Arnoldi space that decides takes longer than the cycle
-  const bool tries_another = options.multiplier_method == MultiplierMethod::automatic && dofs <= large_model;
+  // where periods are dear, a search that decides takes longer than the cycle
+  const bool tries_another = options.multiplier_method == MultiplierMethod::automatic && !dear;
   if (projected &&
       (!tries_another || projected->multipliers.complete || projected->multipliers.stability != Stability::undecided))
     return std::move(*projected);
-  const PetscInt steps = options.multipliers > 0 ? options.multipliers : dofs <= large_model ? -96 : -24;
   FloquetAnalysis result =
-      multipliers_by_arnoldi(monodromy, motions_that_may_grow(problem, orbit, other_unstable), steps);
+      multipliers_by_search(monodromy, motions_that_may_grow(problem, orbit, other_unstable), columns);
   if (projected)
   {
     const long periods = projected->multipliers.periods + result.multipliers.periods;

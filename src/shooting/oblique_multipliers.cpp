@@ -7,7 +7,7 @@
 /// they are below 1 by more than their residuals, no larger multiplier is to be expected. That is likely, not
 /// proven.
 #include "deflated_search.hpp"
-#include "squeal/base/constants.hpp"
+#include "squeal/base/cost.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -24,8 +24,8 @@ using Eigen::MatrixXd;
 using Complex = std::complex<double>;
 
 constexpr double largest_condition = 1e6; // of W'V: beyond, an error of 1e-10 in Z is one of 1e-4 in mu
-// A pass leaves some 0.6 of the error: the pin needed 17. On a large model, where the bar holds more, 8 are enough.
-constexpr int passes_at_most = 24, passes_of_large_model = 8;
+// A pass leaves some 0.6 of the error: the pin needed 17. Where periods are dear and the bar holds more, 8 are enough.
+constexpr int most_passes = 24, most_dear_passes = 8;
 
 /// The passes: what the last one found of each wanted value, in the order of the reduced model's.
 struct Passes
@@ -238,10 +238,10 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
 {
   const bool first = passes.pairs.empty();
   constexpr double settled = 2.5e-7; // what other ranks or starts may add up to: below 1e-6
-  const PetscInt dofs = dofs_of(monodromy.orbit.state);
+  const bool dear = is_dear(monodromy.flow.work);
   const auto is_settled = [&](std::size_t i)
   {
-    if (dofs <= large_model) return passes.changes[i] <= settled;
+    if (!dear) return passes.changes[i] <= settled;
     const double beyond = std::abs(passes.pairs[i].lambda) - 1;
     if (beyond > passes.bars[i] && 2 * passes.changes[i] <= 0.1 * beyond) return true;
     // of the grid's error, which the bar holds as well: as much as that, where the verdict stands already
@@ -258,7 +258,7 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
       if (pass > 1 || !first) std::erase_if(refined, is_settled);
       if (!refined.empty()) break;
     }
-    if (refined.empty() || pass == (dofs > large_model ? passes_of_large_model : passes_at_most)) break;
+    if (refined.empty() || pass == (dear ? most_dear_passes : most_passes)) break;
     if (extend(monodromy, corrections(monodromy, slow, refined, passes), passes) == 0) break;
   }
   if (meaningless(passes) && !repels(passes))
@@ -302,8 +302,13 @@ Completeness coverage_of(const SlowMotions& slow, const DeflatedSearch& search)
   if (search.bounded) return {true, ""};
   return {false, format("beside the slowest motions a Ritz value of %.4f has a residual of %.1e: a larger "
                         "-cycle_multipliers would decide",
-                        std::abs(search.largest), search.residual)};
+                        std::abs(search.pair.lambda), search.residual)};
 }
+
+/// The largest pair, to what the projection may go on from.
+const SearchChoice largest_or_bounded{
+    [](const std::vector<DenseEigenpair>&, const StateBlock&) { return std::size_t{}; },
+    [](const DeflatedSearch& search) { return search.bounded || search.residual < 1e-3; }};
 
 /// The passes, and the search beside them. What that finds joins Q: a motion that the reduced model has not becomes one
 /// of the pairs, and what comes of pairs that have not settled goes. Returns why the vectors do not serve, or nothing.
@@ -317,11 +322,11 @@ std::string make_complete(const Monodromy& monodromy, const SlowMotions& slow, I
     if (std::string refusal = make_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
     coverage = {true, ""}; // a multiplier above 1 needs no other
     if (repels(passes)) return {};
-    DeflatedSearch search = search_beside(monodromy, passes.wanted, slow.others, columns);
+    const DeflatedSearch search = search_beside(monodromy, passes.wanted, slow.others, columns, largest_or_bounded);
     searched += search.columns;
     coverage = coverage_of(slow, search);
-    if (search.bounded || !search.vector || round == rounds) return {};
-    if (extend(monodromy, std::move(*search.vector), passes) == 0) return {};
+    if (search.bounded || round == rounds) return {};
+    if (extend(monodromy, combination(search.Q, parts_of(search.pair.y)), passes) == 0) return {};
   }
 }
 
@@ -355,7 +360,7 @@ std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodr
     multipliers.errors.push_back(passes.bars[i]);
     multipliers.upper.push_back(std::abs(passes.pairs[i].lambda) + passes.rises[i]);
   }
-  decide(multipliers, coverage, multipliers.values.size());
+  decide(multipliers, coverage);
   if (passes.pairs.empty()) return result;
   const auto combined = [&](const Eigen::VectorXd& y)
   { return std::move(states_of(combination(passes.space.V, y), orbit.state).front()); };

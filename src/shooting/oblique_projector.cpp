@@ -21,7 +21,7 @@ Eigen::MatrixXd coefficients(const Projector& projector, const StateBlock& X)
 
 void deflate(const Projector& projector, StateBlock& X)
 {
-  subtract(X, projector.V, coefficients(projector, X));
+  if (projector.V.columns() > 0) subtract(X, projector.V, coefficients(projector, X));
 }
 
 StateBlock image_of(const Monodromy& monodromy, const StateBlock& X)

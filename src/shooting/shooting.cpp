@@ -3,7 +3,7 @@
 #include "beside_orbit.hpp"
 #include "free_periods.hpp"
 #include "squeal/base/constants.hpp"
-#include "squeal/base/run_control.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/shooting/full_space.hpp"
 #include "subspace_newton.hpp"
 
@@ -42,89 +42,17 @@ struct Search
   const ShootingStart& start;
 };
 
-/// What a motion beside an orbit was seen to do.
-enum class Beside
-{
-  not_seen,
-  leaves,
-  unclear, // against the verdict "unstable" it does not leave, and hardly comes nearer
-};
-
 /// What shooting from one state led to.
 struct Attempt
 {
   StageResult found;
-  FloquetAnalysis floquet{}; // of a converged orbit
-  double first_return = 0;   // return residual where it started
-  Beside beside = Beside::not_seen;
-  bool cut_short = false; // the run was asked to end in the search for multipliers
+  double first_return = 0; // return residual where it started
+  Verdict verdict{};       // of a converged orbit
 
   bool converged() const { return found.ending == StageEnding::converged; }
-  bool repels() const
-  {
-    return converged() && (beside == Beside::leaves || floquet.multipliers.stability == Stability::unstable);
-  }
-  bool answers() const { return converged() && !repels() && beside != Beside::unclear; }
+  bool repels() const { return converged() && verdict.repels(); }
+  bool answers() const { return converged() && !verdict.repels() && verdict.beside != Beside::unclear; }
 };
-
-/// Whether a motion that began a part beside an orbit leaves it: its distance doubles, or grows to four times its least
-/// where that is above what the orbit's residual adds. NaN has left, too.
-bool leaves(const std::vector<double>& distances, double part, double residual)
-{
-  double least = HUGE_VAL;
-  for (const double distance : distances)
-  {
-    if (!(distance < 2 * part) || distance >= 4 * std::max(least, 10 * residual)) return true;
-    least = std::min(least, distance);
-  }
-  return false;
-}
-
-/// Holds a verdict against a motion beside the orbit, until its distance has doubled or is a tenth: other motions may
-/// shrink it at first. Doubling shows that an undecided orbit repels, and so does growth to four times its least.
-/// Where it does neither over periods that should make it four times as large, the verdict "unstable" is undecided:
-/// where contact only just opens, closes or sticks, the tangent holds in a neighbourhood that no motion stays in. Where
-/// the largest multiplier is hardly above 1, that many periods cost too much.
-void hold_against_motion(const Search& search, Attempt& attempt)
-{
-  constexpr double part = 0.01;                 // of the fluctuation: above the orbit's tolerance, below its saturation
-  constexpr long many = 80, many_of_large = 20; // periods
-  const auto& [problem, options, log, start] = search;
-  Multipliers& multipliers = attempt.floquet.multipliers;
-  const double largest = multipliers.values.empty() ? 0 : std::abs(multipliers.values.front());
-  const bool unstable = multipliers.stability == Stability::unstable;
-  if (!attempt.floquet.fastest.real.get() || !(largest > 1) || multipliers.stability == Stability::stable) return;
-  const PetscInt dofs = dofs_of(attempt.found.orbit.state);
-  const long at_most = dofs > large_model ? many_of_large : many;
-  if (!(std::log(4) / std::log(largest) <= static_cast<double>(at_most))) return;
-  if (log.convergence.periods + at_most > options.max_periods) return;
-  const std::vector<double> distances = distances_beside(problem, log, attempt.found.orbit, attempt.floquet.fastest,
-                                                         {part, 0.1 * part, 2 * part, at_most});
-  if (leaves(distances, part, attempt.found.orbit.residual)) attempt.beside = Beside::leaves;
-  if (!unstable || attempt.beside == Beside::leaves) return;
-  if (distances.back() > 0.5 * part) attempt.beside = Beside::unclear;
-  multipliers.stability = Stability::undecided;
-  multipliers.crossing = Crossing::none;
-  multipliers.would_decide =
-      format("small motions grow %.4g times a period by the tangent, but one that began %.2g %% beside the cycle is "
-             "%.2g %% away after %zu periods: contact that only just opens, closes or sticks; other steps a period, or "
-             "-cycle_watched_periods",
-             largest, 100 * part, 100 * distances.back(), distances.size());
-}
-
-/// Watches motions beside an orbit of few degrees of freedom where only the bar of the largest multiplier, of a whole
-/// matrix, leaves the verdict open. Like the columns of that matrix the periods are none of the search's.
-void watch_undecided(const Search& search, Attempt& attempt)
-{
-  constexpr long enough = 200; // periods: a growth of 1e-3 a period shows
-  const auto& [problem, options, log, start] = search;
-  Multipliers& multipliers = attempt.floquet.multipliers;
-  const bool open = multipliers.stability == Stability::undecided && multipliers.complete &&
-                    multipliers.method == MultiplierMethod::whole && largest_reaches_across(multipliers);
-  if (options.watched_periods >= 0 || !open || attempt.beside != Beside::not_seen) return;
-  multipliers.seen = growths_beside(problem, log, attempt.found.orbit, attempt.floquet, enough);
-  decide_by_growth(multipliers.seen, multipliers);
-}
 
 /// Whether shooting has found the orbit again. Each is known up to its residual, which slow motions multiply.
 bool is_again(const Orbit& orbit, const Orbit& known)
@@ -149,30 +77,17 @@ Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* kno
   const double first_return = return_residual(problem, free);
   if (orbit.residual > problem.tolerance && options.subspace_newtons > 0 && !start.shapes.empty())
     orbit = shoot_on_shapes(problem, options, log, std::move(orbit), start.shapes);
-  Attempt attempt{shoot_once(problem, options, log, std::move(orbit)), {}, first_return};
+  Attempt attempt{shoot_once(problem, options, log, std::move(orbit)), first_return};
   if (!attempt.converged()) return attempt;
   const int rounds = repeats_start(search, attempt.found.orbit) ? start.rounds : 2;
   attempt.found = prefer_fewer_rounds(problem, options, log, rounds, std::move(attempt.found));
   if (known && known->converged() && is_again(attempt.found.orbit, known->found.orbit))
   {
-    attempt.floquet.multipliers = known->floquet.multipliers;
-    attempt.beside = known->beside;
-    return attempt;
+    attempt.verdict.floquet.multipliers = known->verdict.floquet.multipliers;
+    attempt.verdict.beside = known->verdict.beside;
   }
-  const char* sought = "its multipliers were sought";
-  try
-  {
-    attempt.floquet = find_multipliers(problem, options, attempt.found.orbit, start.other_unstable);
-    sought = "a motion beside it was watched";
-    hold_against_motion(search, attempt);
-    watch_undecided(search, attempt);
-  }
-  catch (const Interrupted&) // on all ranks alike: the orbit stays
-  {
-    attempt.cut_short = true;
-    attempt.floquet.multipliers.stability = Stability::undecided;
-    attempt.floquet.multipliers.would_decide = std::string("the run was ended while ") + sought;
-  }
+  else
+    attempt.verdict = judge(problem, options, log, attempt.found.orbit, start.other_unstable);
   return attempt;
 }
 
@@ -184,13 +99,13 @@ bool better(const Attempt& first, const Attempt& second)
 }
 
 /// Whether a motion beside an orbit that repels leaves it so slowly that the search cannot see where it goes. It leaves
-/// from a tenth of the fluctuation to all of it. A small model is searched all the same: its periods cost little.
+/// from a tenth of the fluctuation to all of it. Where periods cost little it is searched all the same.
 bool leaves_too_slowly(const Search& search, const Attempt& attempt, int done)
 {
-  const PetscInt dofs = dofs_of(attempt.found.orbit.state);
-  if (dofs <= large_model || !attempt.repels() || attempt.floquet.multipliers.values.empty()) return false;
-  const double largest = std::abs(attempt.floquet.multipliers.values.front());
-  return std::log(10) > (search.options.free_periods - done) * std::log(std::max(largest, 1.));
+  const std::vector<std::complex<double>>& values = attempt.verdict.floquet.multipliers.values;
+  const int left = search.options.free_periods - done;
+  if (!attempt.repels() || values.empty() || !is_dear(search.problem.flow.work)) return false;
+  return std::log(10) > left * std::log(std::max(std::abs(values.front()), 1.));
 }
 
 /// Goes on integrating for 20, 40, 80 … periods, and shoots again after each or as soon as the motion returns three
@@ -212,7 +127,7 @@ Attempt search_on(const Search& search, Attempt best, int done, Orbit& free)
     if (best.repels() && (side == 0 || other_side))
     {
       side = other_side ? -1 : 1;
-      state = state_beside(problem, best.found.orbit, best.floquet.fastest.real,
+      state = state_beside(problem, best.found.orbit, best.verdict.floquet.fastest.real,
                            0.1 * side); // far enough to leave it in a few periods
       period = best.found.orbit.period;
       collapses = 0;
@@ -300,43 +215,14 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
 
   ShootingResult result;
   result.outcome = outcome_of(log.convergence, ending, found.found.orbit.residual);
-  std::vector<SeenGrowth> seen;
-  if (options.watched_periods > 0 && found.converged() && !found.cut_short) try
-    {
-      seen = growths_beside(problem, log, found.found.orbit, found.floquet, options.watched_periods);
-    }
-    catch (const Interrupted&) // on all ranks alike: the verdict stands
-    {
-      found.cut_short = true;
-    }
-  result.multipliers = std::move(found.floquet.multipliers);
-  decide_by_growth(seen, result.multipliers);
-  if (!seen.empty()) result.multipliers.seen = std::move(seen);
-  refuse_repelling(result.multipliers, start.other_unstable.size(), result.outcome);
-  if (found.beside != Beside::not_seen && result.outcome.kind == OutcomeKind::converged)
-  {
-    result.outcome.kind = OutcomeKind::unstable_cycle;
-    result.outcome.reason = found.beside == Beside::leaves
-                                ? "the cycle found repels: integrated beside it, a motion leaves it"
-                                : "whether the cycle found repels is undecided: " + result.multipliers.would_decide;
-  }
+  refuse_repelling(found.verdict, start.other_unstable.size(), result.outcome);
+  result.multipliers = std::move(found.verdict.floquet.multipliers);
   if (slow) result.outcome.reason += leaving_time(result.multipliers, found.found.orbit.period);
   result.orbit = std::move(found.found.orbit);
   if (goes_on) result.free = std::move(free);
   result.convergence = std::move(log.convergence);
-  result.cut_short = found.cut_short;
+  result.cut_short = found.verdict.cut_short;
   return result;
-}
-
-void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable, Outcome& outcome)
-{
-  if (outcome.kind != OutcomeKind::converged || multipliers.stability != Stability::unstable) return;
-  outcome.kind = other_unstable == 0 ? OutcomeKind::unstable_cycle : OutcomeKind::not_periodic;
-  const bool as_seen = largest_reaches_across(multipliers) && !multipliers.seen.empty();
-  outcome.reason = format("the cycle found repels: a small motion beside it grows %.4g times a period (%s)",
-                          as_seen ? multipliers.seen.back().growth : std::abs(multipliers.values.front()),
-                          word(multipliers.crossing));
-  if (other_unstable > 0) outcome.reason += format("; %zu modes are unstable", other_unstable + 1);
 }
 
 } // namespace squeal

@@ -303,11 +303,11 @@ Structure assemble(const MeshPiece& piece, const Scene& scene, MPI_Comm comm)
   return structure;
 }
 
-bool is_large(const Structure& structure)
+double work_of_step(const Structure& structure)
 {
-  PetscInt dofs = 0;
-  check(VecGetSize(structure.load, &dofs));
-  return dofs > large_model;
+  MatInfo info;
+  check(MatGetInfo(structure.K, MAT_GLOBAL_SUM, &info));
+  return info.nz_used;
 }
 
 } // namespace squeal

@@ -2,7 +2,7 @@
 
 #include "following.hpp"
 #include "squeal/algebra/lent_cores.hpp"
-#include "squeal/base/constants.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 #include "swept_model.hpp"
@@ -140,7 +140,8 @@ private:
 
   double tolerance_on(const Structure& structure) const
   {
-    if (is_large(structure)) return large_tolerance;
+    constexpr double of_point = 3000; // products, for its modes
+    if (of_point * work_of_step(structure) > affordable_work) return large_tolerance;
     PetscInt dofs = 0;
     check(VecGetSize(structure.load, &dofs));
     return dofs > problem_.modes_options.dense_limit ? tolerance_of_basis : exact_tolerance;

@@ -70,7 +70,7 @@ TEST_CASE("multipliers of the van der Pol cycle: one, and a strong contraction")
 TEST_CASE("the multisecant finish agrees with the reference")
 {
   SmoothModel model = make_smooth_model(van_der_pol, {1});
-  model.flow.apply_tangent = nullptr; // which leaves a small system to multisecants
+  model.flow.apply_tangent = nullptr; // which leaves a small system to secants of its own steps
   ShootingOptions options;
   options.multipliers = 0;
   const ShootingResult cycle = shoot_from(model, {1.5}, 6.3, 2, options);

@@ -26,7 +26,7 @@ template <> inline constexpr std::array words_of<MotionKind> = {"undecided", "pe
 /// Options -settled_...
 struct SettledOptions
 {
-  PetscInt periods = 0;   // integrated at most; 0: 2048, and 512 of a large model, where a period costs seconds
+  PetscInt periods = 0;   // integrated at most; 0: 2048, and 512 where they are dear
   PetscInt exponents = 4; // Lyapunov exponents
   PetscInt shapes = 100;  // at most, that the motion is kept on
 };

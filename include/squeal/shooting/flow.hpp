@@ -52,6 +52,7 @@ struct Flow
   std::function<void(std::span<const Vec> states)> apply_tangent{};
   /// The slow motions of this period, which becomes the one recorded last. Empty: none are known.
   std::function<SlowMotions(double period, Vec start)> slow_motions{};
+  double work = 0; // counted, of a period (squeal/base/cost.hpp)
 };
 
 /// y = P^-1 x, an approximate inverse of dPhi_T/dx - I at this period; x and y are states. Empty: P = -I.

@@ -7,7 +7,7 @@
 namespace squeal
 {
 
-/// One attempt: Newton with the whole matrix of a small system's exact tangent, else the multisecant iteration.
+/// One attempt by the multisecant iteration; its secants are exact where a whole tangent is cheap.
 StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, Orbit start);
 
 /// The same; where it gives up, ten free periods and one more attempt.

@@ -1,9 +1,10 @@
 #pragma once
 /// Floquet multipliers: eigenvalues of the monodromy matrix dPhi_T/dx at a periodic orbit (src/README.md, section 6.9).
 ///
-/// A small system's matrix is formed whole. A large one's is projected obliquely on approximate right and left vectors
-/// where the flow knows some. Else it is projected on an Arnoldi space in the energy product. All use the flow's exact
-/// tangent. The shift in time, whose multiplier is 1, is the value near 1 whose vector is closest to d.
+/// The matrix is formed whole where that takes no more columns than a projection. Else it is projected obliquely on
+/// approximate right and left vectors, where the flow knows some, or the largest value is sought in a block Arnoldi
+/// space. All use the flow's exact tangent. The shift in time, whose multiplier is 1, is the value near 1 whose vector
+/// is closest to d.
 ///
 /// Each multiplier has an error bar of its own. In a whole matrix none is smaller than the distance of the shift's own
 /// multiplier from 1; a projection's bars do not hold that.
@@ -93,8 +94,8 @@ struct FloquetAnalysis
 };
 
 /// All multipliers of a system whose whole matrix has at most 200 columns. Of a larger one those of the slow motions,
-/// or of as many Arnoldi steps as its leading value needs. These are at most 96, or 24 beyond 10 000 degrees of
-/// freedom. ShootingOptions may force a method. Collective. Error: as of the flow.
+/// or the largest one, sought in at most 96 columns on each grid of time. ShootingOptions may force a method.
+/// Collective. Error: as of the flow.
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
                                  const std::vector<Owned<Vec>>& other_unstable);
 

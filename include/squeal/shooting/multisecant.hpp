@@ -1,26 +1,13 @@
 #pragma once
 /// Full-space solution by secants (src/README.md, section 6.7; Anderson 1965, Eyert 1996) about the preconditioner: one
-/// period a step, no difference columns. States are bordered by T and by the phase row <f, dx>; B is the bordered P, G
-/// = B^-1 (F, 0) the preconditioned defect. With the last steps X and their changes of G, Y = Q R,
-///     dx = -X R^-1 Q'G - (1 - Q Q') G.
-/// Q is orthogonal in the energy norm of G, not of F. In F, motions that the next period damps out would be larger than
-/// the slow ones that are sought.
+/// period a step, no difference columns.
 ///
 /// Caveat: no globalisation. The step is clamped and the iteration guarded, and it ends without progress.
 #include "squeal/shooting/options.hpp"
-#include "squeal/shooting/orbit.hpp"
-
-#include <deque>
+#include "squeal/shooting/secants.hpp"
 
 namespace squeal
 {
-
-/// A step of the iteration and what it did to the preconditioned defect.
-struct Secant
-{
-  Owned<Vec> step, change; // dx; P^-1 dF
-  double period = 0;       // [s] dT
-};
 
 /// Relative changes of an orbit.
 struct RelativeChange
@@ -31,6 +18,7 @@ struct RelativeChange
 /// The iteration's memory; it serves the next solution at nearly the same flow as well.
 struct Multisecant
 {
+  bool exact = false;           // steps are Newton's, whose secants are columns of the exact tangent
   std::deque<Secant> secants{}; // newest first
   double target_error = 0;      // above 0: converged as soon as `remaining` is at most this
   RelativeChange last_step{};   // of the latest step estimated

@@ -10,8 +10,8 @@ namespace squeal
 /// The solver of the full-space equations that ends a shooting.
 enum class Finish
 {
-  multisecant, // or Newton with the whole tangent of a small system
-  none,        // the orbit of the subspace is the result
+  multisecant,
+  none, // the orbit of the subspace is the result
 };
 
 template <> inline constexpr std::array words_of<Finish> = {"multisecant", "none"};
@@ -19,10 +19,10 @@ template <> inline constexpr std::array words_of<Finish> = {"multisecant", "none
 /// How Floquet multipliers are found (src/README.md, section 6.9).
 enum class MultiplierMethod
 {
-  automatic, // by the size of the system
+  automatic, // by the columns that each takes
   whole,     // from the whole monodromy matrix
   oblique,   // by projection on approximate right and left vectors; arnoldi where there are none
-  arnoldi,
+  arnoldi,   // the largest one, in a block Arnoldi space
 };
 
 template <> inline constexpr std::array words_of<MultiplierMethod> = {"auto", "whole", "oblique", "arnoldi"};

@@ -47,12 +47,10 @@ enum class ShootingStage
   free_periods, // integration without correction
   subspace,     // Newton on the coordinates of a few given shapes
   multisecant,
-  full_period,  // one evaluation of a full model's flow
-  exact_newton, // with the whole matrix of the exact tangent
+  full_period, // one evaluation of a full model's flow
 };
 
-template <>
-inline constexpr std::array words_of<ShootingStage> = {"free", "reduced", "multisecant", "full period", "newton"};
+template <> inline constexpr std::array words_of<ShootingStage> = {"free", "reduced", "multisecant", "full period"};
 
 /// One line of the history of convergence.
 struct NewtonRecord

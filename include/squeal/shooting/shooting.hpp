@@ -3,8 +3,7 @@
 ///
 /// The order of the stages: free periods, the paper's subspace, the full-space finish. Then the multipliers say whether
 /// motions settle on the orbit found.
-#include "squeal/base/outcome.hpp"
-#include "squeal/shooting/multipliers.hpp"
+#include "squeal/shooting/verdict.hpp"
 
 namespace squeal
 {
@@ -44,9 +43,6 @@ struct ShootingResult
   Multipliers multipliers;
   bool cut_short = false; // the run was asked to end in the search for multipliers
 };
-
-/// An orbit that repels is no answer; with other unstable modes the motion need not be periodic at all. Not collective.
-void refuse_repelling(const Multipliers& multipliers, std::size_t other_unstable, Outcome& outcome);
 
 /// The problem of finding an orbit near the start. Borrows flow and preconditioner. Collective.
 OrbitProblem problem_of(const Flow& flow, const Preconditioner& preconditioner, const ShootingStart& start,

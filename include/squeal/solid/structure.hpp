@@ -38,8 +38,8 @@ Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const DofMap& dof
 /// for a G or H that is not skew.
 Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm);
 
-/// Whether the structure has more degrees of freedom than large_model. Not collective.
-bool is_large(const Structure& structure);
+/// Counted work of a step: numbers of the stiffness. Collective.
+double work_of_step(const Structure& structure);
 
 /// Declares to PETSc that A stays symmetric and that its pattern is complete. Not collective.
 void mark_symmetric(Mat A);

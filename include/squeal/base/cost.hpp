@@ -1,0 +1,30 @@
+#pragma once
+/// Counted work, by which the program chooses between ways to one result: numbers of matrices that steps read. Ratios
+/// are fixed and no clock is read, so that equal runs choose alike.
+
+namespace squeal
+{
+
+/// Work that a question beside the main one may take.
+inline constexpr double affordable_work = 2e9;
+
+/// Periods that a search takes, or so.
+inline constexpr double periods_of_search = 25;
+
+/// Columns of the tangent that take as much as a period: they solve no contact, and share their reading.
+inline constexpr double columns_per_period = 4;
+
+/// Whether periods of this work are dear: a search takes more than is affordable. Factors, passes of contact, columns
+/// and free periods are then spared.
+constexpr bool is_dear(double of_period)
+{
+  return periods_of_search * of_period > affordable_work;
+}
+
+/// Whether the whole tangent of a state with so many entries takes no more columns than a search takes work.
+constexpr bool whole_tangent_is_cheap(double entries)
+{
+  return entries <= columns_per_period * periods_of_search;
+}
+
+} // namespace squeal
