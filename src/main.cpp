@@ -141,7 +141,7 @@ std::string problem_of_written(const std::vector<std::string>& files, const Argu
   if (arguments.scene.empty()) return {};
   std::vector<std::filesystem::path> taken = {arguments.scene};
   const auto place = arguments.output.empty() ? default_output(arguments.scene) : arguments.output;
-  for (const char* name : result_file_names) taken.push_back(place / name);
+  for (const char* name : words_of<ResultFile>) taken.push_back(place / name);
   for (const std::string& file : files)
     if (std::ranges::any_of(taken, [&](const auto& other) { return is_same_file(file, other); }))
       return "the output " + shortened(file) + " of PETSc's would fall on the scene or a result: name another file";

@@ -31,7 +31,7 @@ constexpr const char* earlier_folder = ".replaced"; // the results that are repl
 
 bool is_result(const fs::path& name)
 {
-  return std::find(result_file_names.begin(), result_file_names.end(), name) != result_file_names.end();
+  return std::find(words_of<ResultFile>.begin(), words_of<ResultFile>.end(), name) != words_of<ResultFile>.end();
 }
 
 /// "2026-01-31T12:00:00.123456Z HOST 4711": time, machine and process tell any two runs apart.
@@ -321,7 +321,7 @@ void check_outputs(const Scene& scene, const std::vector<fs::path>& inputs, cons
   if (!fs::exists(place, failed) && failed) // a name that is too long, a link to itself
     throw Error("the output " + shortened(place) + ": " + failed.message() + ": name another folder with --output DIR");
   std::vector<fs::path> results;
-  for (const char* name : result_file_names)
+  for (const char* name : words_of<ResultFile>)
     if (results.push_back(place / name); results.back().has_extension() && is_folder(results.back()))
       throw Error("the output " + results.back().string() +
                   " is a folder, which the result would replace: name another folder with --output DIR");
