@@ -52,33 +52,41 @@ void set_threads(int threads)
   if (auto* const set = function_of_blas<void(int)>("openblas_set_num_threads")) set(threads);
 }
 
-} // namespace
-
-LentCores::LentCores(MPI_Comm comm, std::size_t rows) : comm_(ranks_of(comm) > 1 && rows >= 500 ? comm : MPI_COMM_NULL)
+/// Sleeps until rank 0 has come here: MPI's own waiting would take the core. Collective.
+void wait_for_rank_zero(MPI_Comm comm)
 {
-  if (comm_ == MPI_COMM_NULL) return;
-  const int threads = std::min(ranks_of_node(comm), allowed_cores());
-  const int before = threads_of_blas();
-  if (rank_of(comm) != 0 || before == 0 || before >= threads) return;
-  threads_ = before;
-  set_threads(threads);
-}
-
-LentCores::~LentCores()
-{
-  if (comm_ == MPI_COMM_NULL) return;
-  if (threads_ > 0) set_threads(threads_);
-  MPI_Request ended = MPI_REQUEST_NULL;
-  MPI_Ibarrier(comm_, &ended);
-  if (rank_of(comm_) == 0)
+  MPI_Request here = MPI_REQUEST_NULL;
+  MPI_Ibarrier(comm, &here);
+  if (rank_of(comm) == 0)
   {
-    MPI_Wait(&ended, MPI_STATUS_IGNORE);
+    MPI_Wait(&here, MPI_STATUS_IGNORE);
     return;
   }
-  constexpr auto pause = std::chrono::microseconds(200); // MPI's own waiting would take the core
+  constexpr auto pause = std::chrono::microseconds(200);
   int done = 0;
-  for (MPI_Test(&ended, &done, MPI_STATUS_IGNORE); !done; MPI_Test(&ended, &done, MPI_STATUS_IGNORE))
+  for (MPI_Test(&here, &done, MPI_STATUS_IGNORE); !done; MPI_Test(&here, &done, MPI_STATUS_IGNORE))
     std::this_thread::sleep_for(pause);
+}
+
+} // namespace
+
+void on_rank_zero_with_lent_cores(MPI_Comm comm, std::size_t rows, const std::function<void()>& work)
+{
+  if (ranks_of(comm) == 1 || rows < 500) return on_rank_zero(comm, work);
+  const int threads = std::min(ranks_of_node(comm), allowed_cores()), before = threads_of_blas();
+  const bool more = rank_of(comm) == 0 && before > 0 && before < threads;
+  const auto with_cores = [&]
+  {
+    if (more) set_threads(threads);
+    const Finally end(
+        [&]
+        {
+          if (more) set_threads(before);
+          wait_for_rank_zero(comm);
+        });
+    if (rank_of(comm) == 0) work();
+  };
+  on_every_rank(comm, with_cores);
 }
 
 Finally one_thread()

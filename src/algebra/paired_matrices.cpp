@@ -57,20 +57,18 @@ void add_both(const PairedRows& matrices, const double* x, double* y)
   add_product<1, Two, Two, 1>(matrices, x, y);
 }
 
-/// 4 or 8 trajectories.
-SQUEAL_SIMD void add_products(const PairedRows& matrices, std::size_t count, const double* x, double* y)
+/// 4 or 8 trajectories of both matrices, or of M alone.
+SQUEAL_SIMD void add_products(const PairedRows& matrices, std::size_t parts, std::size_t count, const double* x,
+                              double* y)
 {
-  count == 4          ? add_product<2, double, Four, 1>(matrices, x, y)
-  : SQUEAL_HAS_AVX512 ? add_product<2, double, Eight, 1>(matrices, x, y)
-                      : add_product<2, double, Four, 2>(matrices, x, y);
-}
-
-/// M alone, 4 or 8 trajectories.
-SQUEAL_SIMD void add_mass_products(const PairedRows& matrices, std::size_t count, const double* x, double* y)
-{
-  count == 4          ? add_product<1, double, Four, 1>(matrices, x, y)
-  : SQUEAL_HAS_AVX512 ? add_product<1, double, Eight, 1>(matrices, x, y)
-                      : add_product<1, double, Four, 2>(matrices, x, y);
+  if (parts == 2)
+    count == 4          ? add_product<2, double, Four, 1>(matrices, x, y)
+    : SQUEAL_HAS_AVX512 ? add_product<2, double, Eight, 1>(matrices, x, y)
+                        : add_product<2, double, Four, 2>(matrices, x, y);
+  else
+    count == 4          ? add_product<1, double, Four, 1>(matrices, x, y)
+    : SQUEAL_HAS_AVX512 ? add_product<1, double, Eight, 1>(matrices, x, y)
+                        : add_product<1, double, Four, 2>(matrices, x, y);
 }
 
 /// y += A x for columns of other ranks; Entry, Vector and the rows of x as above.
@@ -100,18 +98,17 @@ void add_foreign_both(const PairedRows& matrices, const double* x, double* y)
   add_foreign<1, Two, Two, 1>(matrices, x, y);
 }
 
-SQUEAL_SIMD void add_foreign_products(const PairedRows& matrices, std::size_t count, const double* x, double* y)
+SQUEAL_SIMD void add_foreign_products(const PairedRows& matrices, std::size_t parts, std::size_t count, const double* x,
+                                      double* y)
 {
-  count == 4          ? add_foreign<2, double, Four, 1>(matrices, x, y)
-  : SQUEAL_HAS_AVX512 ? add_foreign<2, double, Eight, 1>(matrices, x, y)
-                      : add_foreign<2, double, Four, 2>(matrices, x, y);
-}
-
-SQUEAL_SIMD void add_foreign_mass_products(const PairedRows& matrices, std::size_t count, const double* x, double* y)
-{
-  count == 4          ? add_foreign<1, double, Four, 1>(matrices, x, y)
-  : SQUEAL_HAS_AVX512 ? add_foreign<1, double, Eight, 1>(matrices, x, y)
-                      : add_foreign<1, double, Four, 2>(matrices, x, y);
+  if (parts == 2)
+    count == 4          ? add_foreign<2, double, Four, 1>(matrices, x, y)
+    : SQUEAL_HAS_AVX512 ? add_foreign<2, double, Eight, 1>(matrices, x, y)
+                        : add_foreign<2, double, Four, 2>(matrices, x, y);
+  else
+    count == 4          ? add_foreign<1, double, Four, 1>(matrices, x, y)
+    : SQUEAL_HAS_AVX512 ? add_foreign<1, double, Eight, 1>(matrices, x, y)
+                        : add_foreign<1, double, Four, 2>(matrices, x, y);
 }
 
 /// Columns of other ranks in this rank's rows, ascending.
@@ -212,9 +209,8 @@ namespace
 
 /// Products of the first of `from.size()` matrices with the vectors of from[0], of the next with those of from[1], for
 /// `lanes` trajectories at once.
-template <class Add, class AddForeign>
 void multiply(const PairedMatrices& matrices, std::size_t lanes, std::span<const std::span<const Vec>> from,
-              std::span<const std::span<const Vec>> to, Add add, AddForeign add_others)
+              std::span<const std::span<const Vec>> to)
 {
   const std::size_t rows = matrices.own.starts.size() - 1, parts = from.size(), stride = parts * lanes;
   std::vector<double> x(stride * rows), y, z(stride * matrices.received);
@@ -232,12 +228,14 @@ void multiply(const PairedMatrices& matrices, std::size_t lanes, std::span<const
     for (std::size_t i = 0; i < rows; ++i)
       for (std::size_t k = 0; k < parts * count; ++k) x[i * stride + k / count * lanes + k % count] = read[k][i];
     y.assign(x.size(), 0.);
-    add(matrices.own, x.data(), y.data());
+    lanes == 1 ? add_both(matrices.own, x.data(), y.data())
+               : add_products(matrices.own, parts, lanes, x.data(), y.data());
     if (ranks_of(matrices.comm) > 1)
     {
       check(PetscSFBcastBegin(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
       check(PetscSFBcastEnd(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
-      add_others(matrices.foreign, z.data(), y.data());
+      lanes == 1 ? add_foreign_both(matrices.foreign, z.data(), y.data())
+                 : add_foreign_products(matrices.foreign, parts, lanes, z.data(), y.data());
     }
     for (std::size_t i = 0; i < rows; ++i)
       for (std::size_t k = 0; k < parts * count; ++k) written[k][i] = y[i * stride + k / count * lanes + k % count];
@@ -255,24 +253,13 @@ void multiply_both(const PairedMatrices& matrices, std::span<const Vec> v, std::
                    std::span<const Vec> Mv, std::span<const Vec> Ku)
 {
   const std::array from{v, u}, to{Mv, Ku};
-  const std::size_t lanes = std::min<std::size_t>(8, lanes_for(v.size()));
-  if (lanes == 1)
-    multiply(matrices, lanes, from, to, add_both, add_foreign_both);
-  else
-    multiply(
-        matrices, lanes, from, to,
-        [&](const PairedRows& own, const double* x, double* y) { add_products(own, lanes, x, y); },
-        [&](const PairedRows& foreign, const double* x, double* y) { add_foreign_products(foreign, lanes, x, y); });
+  multiply(matrices, std::min<std::size_t>(8, lanes_for(v.size())), from, to);
 }
 
 void multiply_first(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> Mv)
 {
   const std::array from{v}, to{Mv};
-  const std::size_t lanes = v.size() <= 4 ? 4 : 8;
-  multiply(
-      matrices, lanes, from, to,
-      [&](const PairedRows& own, const double* x, double* y) { add_mass_products(own, lanes, x, y); },
-      [&](const PairedRows& foreign, const double* x, double* y) { add_foreign_mass_products(foreign, lanes, x, y); });
+  multiply(matrices, v.size() <= 4 ? 4 : 8, from, to);
 }
 
 } // namespace squeal

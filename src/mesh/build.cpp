@@ -218,7 +218,8 @@ void add_faces(const ElementBlock& block, const std::string& name, const UsedSur
   if (!shape)
   {
     if (!used.all.count(name)) return;
-    throw Error("surface '" + name + "' has faces '" + block.type_name + "', which squeal cannot integrate over");
+    throw Error("surface '" + name + "' has faces '" + block.type_name + "', which squeal cannot integrate over" +
+                (block.type == 10 ? ": " + remedy(12) : ""));
   }
   const int n = block.nodes_per_element, corners = corner_count(*shape);
   std::size_t without_element = 0, between_solids = 0;

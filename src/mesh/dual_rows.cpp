@@ -236,10 +236,6 @@ ContactSurface contact_surface(const Mesh& mesh, const std::string& name, const 
   surface.nodes = nodes_of_faces(surface.faces);
   for (const Face& face : surface.faces)
   {
-    if (face.shape == FaceShape::quad9)
-      throw Error("contact surface '" + name +
-                  "' has 9-node faces, which no element of squeal has: set "
-                  "Mesh.SecondOrderIncomplete = 1 for 8-node ones");
     std::vector<Vec3> x;
     for (const int node : nodes_of(face)) x.push_back(mesh.nodes[node]);
     surface.placed.push_back({face.shape, position_matrix(x), {}, 0, face.of_shell});

@@ -21,7 +21,7 @@ struct ContactSurface
   std::size_t place_of(int node) const;
 };
 
-/// `user` says in messages what asks for it. Throws Error for a missing surface and for 9-node faces.
+/// `user` says in messages what asks for it. Throws Error for a missing surface.
 ContactSurface contact_surface(const Mesh& mesh, const std::string& name, const std::string& user);
 
 /// A row of the gap operator: weights are multiplied by the area.

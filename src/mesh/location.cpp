@@ -33,60 +33,47 @@ Box box_of(const Mesh& mesh, const Element& element, double margin)
   return {Corner(low(0), low(1), low(2)), Corner(high(0), high(1), high(2))};
 }
 
-/// Of the simplices' barycentric coordinates the smallest may be negative; along an axis of a box |xi| may exceed 1.
-double excess_of(Shape shape, const Eigen::Vector3d& xi)
+/// Natural coordinates: first those of a simplex, from 0 on with a sum of at most 1, then those of a box, within 1.
+struct Axes
 {
-  const auto of_axes = [&](int count) { return xi.head(count).cwiseAbs().maxCoeff() - 1; };
-  const auto of_simplex = [&](int count) { return -2 * std::min(xi.head(count).minCoeff(), 1 - xi.head(count).sum()); };
+  Eigen::Index simplex, box;
+};
+
+Axes axes_of(Shape shape)
+{
   switch (shape)
   {
-  case Shape::hex8:
-  case Shape::hex20:
-    return of_axes(3);
   case Shape::tet4:
   case Shape::tet10:
-    return of_simplex(3);
+    return {3, 0};
   case Shape::wedge6:
-    return std::max(of_simplex(2), std::abs(xi(2)) - 1);
+    return {2, 1};
   case Shape::shell4:
-    return of_axes(2);
+    return {0, 2};
   case Shape::shell3:
-    return of_simplex(2);
+    return {2, 0};
+  default:
+    return {0, 3};
   }
-  return 0;
+}
+
+/// Of the simplex's barycentric coordinates the smallest may be negative; along an axis of the box |xi| may exceed 1.
+double excess_of(Shape shape, const Eigen::Vector3d& xi)
+{
+  const auto [simplex, box] = axes_of(shape);
+  double excess = -1;
+  if (simplex > 0) excess = -2 * std::min(xi.head(simplex).minCoeff(), 1 - xi.head(simplex).sum());
+  return box > 0 ? std::max(excess, xi.segment(simplex, box).cwiseAbs().maxCoeff() - 1) : excess;
 }
 
 /// The natural coordinates of the element that are nearest to these.
 Eigen::Vector3d inside(Shape shape, const Eigen::Vector3d& xi)
 {
+  const auto [simplex, box] = axes_of(shape);
   Eigen::Vector3d result = xi;
-  const auto clamp = [&](Eigen::Index axis) { result(axis) = std::clamp(xi(axis), -1., 1.); };
-  const auto clamp_simplex = [&](Eigen::Index count)
-  {
-    result.head(count) = xi.head(count).cwiseMax(0);
-    result.head(count) /= std::max(1., result.head(count).sum());
-  };
-  switch (shape)
-  {
-  case Shape::hex8:
-  case Shape::hex20:
-    clamp(2);
-    [[fallthrough]];
-  case Shape::shell4:
-    clamp(0);
-    clamp(1);
-    break;
-  case Shape::tet4:
-  case Shape::tet10:
-    clamp_simplex(3);
-    break;
-  case Shape::wedge6:
-    clamp(2);
-    [[fallthrough]];
-  case Shape::shell3:
-    clamp_simplex(2);
-    break;
-  }
+  result.head(simplex) = xi.head(simplex).cwiseMax(0);
+  result.head(simplex) /= std::max(1., result.head(simplex).sum());
+  result.segment(simplex, box) = xi.segment(simplex, box).cwiseMax(-1).cwiseMin(1);
   return result;
 }
 
@@ -100,10 +87,9 @@ Location located(const Mesh& mesh, int element, const Vec3& point)
   const NodePositions x = position_matrix(positions_of(mesh, of));
   const Eigen::Vector3d p(point[0], point[1], point[2]);
   const Eigen::Index axes = is_shell(of.shape) ? 2 : 3;
-  const bool simplex = of.shape == Shape::tet4 || of.shape == Shape::tet10 || of.shape == Shape::shell3;
-  Location at{element, simplex ? Eigen::Vector3d::Constant(1. / 4) : Eigen::Vector3d::Zero(), 0};
-  if (of.shape == Shape::wedge6) at.xi = {1. / 3, 1. / 3, 0};
-  if (axes == 2) at.xi(2) = 0;
+  Location at{element, Eigen::Vector3d::Zero(), 0};
+  const Eigen::Index simplex = axes_of(of.shape).simplex;
+  at.xi.head(simplex).setConstant(1. / static_cast<double>(simplex + 1));
   double away = 0; // [m] of a shell's surface
   for (int i = 0; i < most; ++i)
   {

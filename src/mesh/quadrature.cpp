@@ -157,8 +157,7 @@ const Quadrature& area_rule(FaceShape shape)
   static const auto rules = with_shape_functions<FaceShape>({{FaceShape::triangle3, collapsed_triangle(3)},
                                                              {FaceShape::quad4, square(3)},
                                                              {FaceShape::triangle6, collapsed_triangle(3)},
-                                                             {FaceShape::quad8, square(3)},
-                                                             {FaceShape::quad9, square(3)}});
+                                                             {FaceShape::quad8, square(3)}});
   return rules.at(shape);
 }
 

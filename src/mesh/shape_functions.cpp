@@ -4,7 +4,6 @@
 ///     linear        N = prod (1 + s_k xi_k) / 2^d
 ///     serendipity   corner     N = prod (1 + s_k xi_k) / 2^d (sum s_k xi_k - d + 1)
 ///                   mid-side   N = (1 - xi_m^2) prod_{k != m} (1 + s_k xi_k) / 2^(d-1),   m the direction of the side
-///     Lagrange      N = prod f_k,   f_k = 1 - xi_k^2 if s_k = 0, else xi_k (xi_k + s_k) / 2
 /// Simplices, with L the barycentric coordinates:
 ///     linear        N = L
 ///     quadratic     corner N = L (2 L - 1),   mid-side between a and b: N = 4 L_a L_b
@@ -23,8 +22,8 @@ namespace
 using NaturalPosition = std::array<int, 3>;
 using Sides = std::span<const std::array<int, 2>>;
 
-constexpr std::array<NaturalPosition, 9> quad_positions = {
-    {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {0, -1, 0}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, 0, 0}}};
+constexpr std::array<NaturalPosition, 8> quad_positions = {
+    {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {0, -1, 0}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}}};
 
 constexpr std::array<std::array<int, 2>, 3> triangle_sides = {{{0, 1}, {1, 2}, {0, 2}}};
 
@@ -47,13 +46,6 @@ ShapeFunctions zero_functions(Eigen::Index nodes)
   return {NodeValues::Zero(nodes), NodeGradients::Zero(3, nodes)};
 }
 
-/// Sets N = prod f_k(xi_k) and its derivatives from the factors and their slopes df_k / dxi_k.
-void set_product(ShapeFunctions& at, Eigen::Index node, const Eigen::Vector3d& f, const Eigen::Vector3d& slope)
-{
-  at.N(node) = f.prod();
-  at.dN.col(node) << slope(0) * f(1) * f(2), f(0) * slope(1) * f(2), f(0) * f(1) * slope(2);
-}
-
 ShapeFunctions linear_box(std::span<const NaturalPosition> nodes, int dimension, const Eigen::Vector3d& xi)
 {
   ShapeFunctions at = zero_functions(static_cast<Eigen::Index>(nodes.size()));
@@ -65,7 +57,8 @@ ShapeFunctions linear_box(std::span<const NaturalPosition> nodes, int dimension,
       slope(k) = 0.5 * nodes[i][k];
       f(k) = 0.5 + slope(k) * xi(k);
     }
-    set_product(at, i, f, slope);
+    at.N(i) = f.prod();
+    at.dN.col(i) << slope(0) * f(1) * f(2), f(0) * slope(1) * f(2), f(0) * f(1) * slope(2);
   }
   return at;
 }
@@ -89,23 +82,6 @@ ShapeFunctions serendipity_box(std::span<const NaturalPosition> nodes, int dimen
     at.dN.col(i) *= bubble;
     at.dN(m, i) = -4 * xi(m) * at.N(i);
     at.N(i) *= bubble;
-  }
-  return at;
-}
-
-ShapeFunctions lagrange_quad(const Eigen::Vector3d& xi)
-{
-  ShapeFunctions at = zero_functions(9);
-  for (Eigen::Index i = 0; i < 9; ++i)
-  {
-    Eigen::Vector3d f = Eigen::Vector3d::Ones(), slope = Eigen::Vector3d::Zero();
-    for (int k = 0; k < 2; ++k)
-    {
-      const double s = quad_positions[i][k], z = xi(k);
-      f(k) = s == 0 ? 1 - z * z : 0.5 * z * (z + s);
-      slope(k) = s == 0 ? -2 * z : z + 0.5 * s;
-    }
-    set_product(at, i, f, slope);
   }
   return at;
 }
@@ -191,9 +167,7 @@ ShapeFunctions shape_functions(FaceShape shape, const Eigen::Vector3d& xi)
   case FaceShape::quad4:
     return linear_box(quad.first(4), 2, xi);
   case FaceShape::quad8:
-    return serendipity_box(quad.first(8), 2, xi);
-  case FaceShape::quad9:
-    return lagrange_quad(xi);
+    return serendipity_box(quad, 2, xi);
   case FaceShape::triangle6:
     return quadratic_simplex(triangle_sides, 2, xi);
   default:

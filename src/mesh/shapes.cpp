@@ -46,7 +46,7 @@ struct FaceTopology
   int gmsh_type;
   int corners;
   int nodes;
-  std::array<int, 9> mirrored;
+  std::array<int, 8> mirrored;
 };
 
 constexpr FaceTopology face_topologies[] = {
@@ -54,7 +54,6 @@ constexpr FaceTopology face_topologies[] = {
     {FaceShape::quad4, 3, 4, 4, {0, 3, 2, 1}},
     {FaceShape::triangle6, 9, 3, 6, {0, 2, 1, 5, 4, 3}},
     {FaceShape::quad8, 16, 4, 8, {0, 3, 2, 1, 7, 6, 5, 4}},
-    {FaceShape::quad9, 10, 4, 9, {0, 3, 2, 1, 7, 6, 5, 4, 8}},
 };
 
 const Topology& topology(Shape shape)

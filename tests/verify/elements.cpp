@@ -152,12 +152,11 @@ TEST_CASE("a folded solid is refused by the name of its Jacobian")
 
 TEST_CASE("the weights of a closed surface of faces are its area vector, and a square shares evenly")
 {
-  const std::vector<Vec3> corners = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {1, 0, 0},
-                                     {2, 1, 0}, {1, 2, 0}, {0, 1, 0}, {1, 1, 0}};
+  const std::vector<Vec3> corners = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0},
+                                     {1, 0, 0}, {2, 1, 0}, {1, 2, 0}, {0, 1, 0}};
   const auto weights = [&](FaceShape shape, std::size_t n) { return face_weights(shape, std::span(corners).first(n)); };
   for (const auto& w : weights(FaceShape::quad4, 4)) CHECK(w[2] == approx(1, 1e-14));
   CHECK(weights(FaceShape::quad8, 8)[0][2] == approx(-1. / 3, 1e-13)); // why quad8 cannot touch
-  CHECK(weights(FaceShape::quad9, 9)[8][2] == approx(16. / 9, 1e-13));
   const std::vector<Vec3> triangle = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.5, 0, 0}, {0.5, 0.5, 0}, {0, 0.5, 0}};
   const auto w = face_weights(FaceShape::triangle6, triangle);
   CHECK(std::abs(w[0][2]) < 1e-15);

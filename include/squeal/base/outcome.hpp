@@ -2,6 +2,7 @@
 /// How a stage of the chain ended: a result that does not converge is reported, never thrown.
 #include "squeal/base/words.hpp"
 
+#include <algorithm>
 #include <array>
 #include <string>
 
@@ -53,19 +54,9 @@ inline bool has_run(const Outcome& outcome)
 /// Whether the stage gave what it promises. A stage that did not run has not failed: the one it waited for did.
 inline bool succeeded(const Outcome& outcome)
 {
-  switch (outcome.kind)
-  {
-  case OutcomeKind::skipped:
-  case OutcomeKind::off:
-  case OutcomeKind::converged:
-  case OutcomeKind::completed:
-  case OutcomeKind::balance:
-  case OutcomeKind::no_balance:
-  case OutcomeKind::settled:
-    return true;
-  default:
-    return false;
-  }
+  using enum OutcomeKind;
+  constexpr std::array good = {skipped, off, converged, completed, balance, no_balance, settled};
+  return std::ranges::find(good, outcome.kind) != good.end();
 }
 
 } // namespace squeal

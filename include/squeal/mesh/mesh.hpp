@@ -38,14 +38,13 @@ enum class FaceShape
   quad4,
   triangle6,
   quad8,
-  quad9,
 };
 
 /// A face of a named surface. Its nodes are counter-clockwise seen from outside the solid it bounds.
 struct Face
 {
   FaceShape shape{};
-  std::array<int, 9> nodes{}; // indices in Mesh::nodes; the first node_count(shape) are used
+  std::array<int, 8> nodes{}; // indices in Mesh::nodes; the first node_count(shape) are used
   bool of_shell = false;      // counter-clockwise as the shell's nodes are, which may be seen from either side
 };
 
