@@ -134,7 +134,7 @@ void warn_of_cycle(Entry out, const Report& report, const StepBias& bias)
 
 void add_reached(Entry out, const ReachedMotion& motion)
 {
-  out.show("kind", "what a motion does at the end; `unsettled`: its energy has a trend", motion.kind);
+  out.show("kind", "what the motion does; one whose energy has a trend is unsettled", motion.kind);
   out.show("mean_fluctuating_energy", "J", "mean energy about equilibrium", motion.energy.value);
   out.error("energy_error", "its error bar", motion.energy.error);
   out.show("frequency_hz", "Hz", "frequency of the mode's coordinate that moves most", motion.frequency.value);

@@ -66,7 +66,7 @@ void add_motion(Entry out, const SweptMotion& motion)
   out.add("outcome", "word", "outcome of the search; `settled`: the settled motion answers", word(motion.outcome.kind));
   out.text("reason", "why it failed, or what is undecided", motion.outcome.reason);
   out.add("kind", "kind of what attracts", motion.kind).column("kind");
-  out.add("stability", "verdict on the cycle found; empty: none was examined", motion.stability).column("stability");
+  out.add("stability", "verdict on the cycle, if one was examined", motion.stability).column("stability");
   out.add("frequency_hz", "Hz", "of the cycle, or of the strongest line", motion.frequency_hz).column("frequency_hz");
   out.add(fluctuating, "J", "mean energy about equilibrium", motion.energy.value).column(fluctuating);
   out.add("energy_error", "J", "of a settled motion: its error", motion.energy.error).column("energy_error");
