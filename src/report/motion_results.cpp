@@ -100,8 +100,8 @@ void add_iteration(Entry out, const NewtonRecord& record)
 void add_figures(Entry out, const LimitCycle& cycle, const StepBias& bias)
 {
   const MeasuredPeriod& measured = cycle.measured;
-  out.show("period", "s", "period", cycle.orbit.period);
-  out.show("frequency_hz", "Hz", "frequency", 1 / cycle.orbit.period);
+  out.show("period", "s", "period of the cycle", cycle.orbit.period);
+  out.show("frequency_hz", "Hz", "frequency of the cycle", 1 / cycle.orbit.period);
   out.show("frequency_bias", "-", "relative error of the frequency by theta and the step", bias.frequency);
   out.add("growth_rate_bias", "-", "relative error of the mode's growth rate by theta and the step", bias.growth);
   out.show("mean_energy", "J", "mean mechanical energy over the period", measured.mean_energy);
