@@ -100,8 +100,8 @@ void add_iteration(Entry out, const NewtonRecord& record)
 void add_figures(Entry out, const LimitCycle& cycle, const StepBias& bias)
 {
   const MeasuredPeriod& measured = cycle.measured;
-  out.show("period", "s", "period", cycle.orbit.period);
-  out.show("frequency_hz", "Hz", "frequency", 1 / cycle.orbit.period);
+  out.show("period", "s", "period of the cycle", cycle.orbit.period);
+  out.show("frequency_hz", "Hz", "frequency of the cycle", 1 / cycle.orbit.period);
   out.show("frequency_bias", "-", "relative error of the frequency by theta and the step", bias.frequency);
   out.add("growth_rate_bias", "-", "relative error of the mode's growth rate by theta and the step", bias.growth);
   out.show("mean_energy", "J", "mean mechanical energy over the period", measured.mean_energy);
@@ -134,7 +134,7 @@ void warn_of_cycle(Entry out, const Report& report, const StepBias& bias)
 
 void add_reached(Entry out, const ReachedMotion& motion)
 {
-  out.show("kind", "what a motion does at the end; `unsettled`: its energy has a trend", motion.kind);
+  out.show("kind", "what the motion does; one whose energy has a trend is unsettled", motion.kind);
   out.show("mean_fluctuating_energy", "J", "mean energy about equilibrium", motion.energy.value);
   out.error("energy_error", "its error bar", motion.energy.error);
   out.show("frequency_hz", "Hz", "frequency of the mode's coordinate that moves most", motion.frequency.value);

@@ -145,12 +145,20 @@ void add_change(Entry out, const Change& change, const ChangeEffect& effect)
     add_eigenvalue(out.group("computed"), "growth rate of the changed structure's mode", effect.computed);
 }
 
+/// The keys of the numbers whose relative change moves the growth rate most.
+std::vector<std::string> strongest(std::vector<NumberDerivative> derivatives)
+{
+  constexpr std::size_t most = 6;
+  std::erase_if(derivatives, [](const NumberDerivative& by) { return !by.known; });
+  std::ranges::stable_sort(derivatives, std::greater(),
+                           [](const NumberDerivative& by) { return std::abs(by.number.value * by.lambda.real()); });
+  std::vector<std::string> keys;
+  for (std::size_t i = 0; i < std::min(most, derivatives.size()); ++i) keys.push_back(derivatives[i].number.key);
+  return keys;
+}
+
 void add_causes(Entry out, const ModeCauses& causes)
 {
-  std::vector<NumberDerivative> derivatives = causes.numbers;
-  const auto effect = [](const NumberDerivative& by)
-  { return by.known ? std::abs(by.number.value * by.lambda.real()) : -1; };
-  std::ranges::stable_sort(derivatives, std::greater(), effect);
   add_eigenvalue(out, "growth rate of an unstable mode", causes.lambda);
   out.add("backward_error", "-", "the larger one of its right and its left vector", causes.backward_error);
   out.show("contact_powers", "1/s", "power of each contact's reactions over energy", causes.contact_powers);
@@ -158,7 +166,8 @@ void add_causes(Entry out, const ModeCauses& causes)
   out.show("turning_friction_powers", "1/s", "power as friction turns, as damping", causes.turning_friction_powers);
   out.show("damping_power", "1/s", "power that dampers, Rayleigh damping and loss factors take", causes.damping_power);
   out.add("power_defect", "1/s", "all of these less twice the growth rate: rounding", causes.defect);
-  out.list("derivatives", add_derivative, derivatives); // the greatest effect of a percent first
+  out.show("strongest", "text", "numbers of which 1 % moves the growth rate most", strongest(causes.numbers));
+  out.list("derivatives", add_derivative, causes.numbers);
   out.list("probes", add_probe_derivative, out.scene().probes, causes.probes);
   out.list("shares", add_share, causes.shares);
   out.list("changes", add_change, out.scene().changes, causes.changes);

@@ -45,19 +45,19 @@ std::vector<Track> unstable_tracks(const Sweep& sweep)
 }
 
 /// Where a point, a threshold or a track is.
-void add_place(Entry out, const char* meaning, const std::vector<double>& values, bool reversed)
+void add_place(Entry out, const char* meaning, const SweptPlace& place)
 {
-  out.show("values", "units of the keys", meaning, values).column("value");
-  out.show("direction", "-", "1: rotation as in the scene, -1: reversed", reversed ? -1 : 1).column("direction");
+  out.show("values", "units of the keys", meaning, place.values).column("value");
+  out.show("direction", "-", "1: rotation as in the scene, -1: reversed", place.reversed ? -1 : 1).column("direction");
 }
 
 /// Where a line of a table is: a value of each number.
-void add_line_place(Entry out, const std::vector<double>& values, bool reversed)
+void add_line_place(Entry out, const SweptPlace& place)
 {
-  for (std::size_t i = 0; i < values.size(); ++i)
-    out.add(out.scene().sweep->key[i], "unit of the key", "value of the number", values[i]);
+  for (std::size_t i = 0; i < place.values.size(); ++i)
+    out.add(out.scene().sweep->key[i], "unit of the key", "value of the number", place.values[i]);
   if (out.is_example()) out.add("<key>", "unit of the key", "value of each number", 0);
-  out.add("direction", "-", "1: rotation as in the scene, -1: reversed", reversed ? -1 : 1);
+  out.add("direction", "-", "1: rotation as in the scene, -1: reversed", place.reversed ? -1 : 1);
 }
 
 void add_motion(Entry out, const SweptMotion& motion)
@@ -66,7 +66,7 @@ void add_motion(Entry out, const SweptMotion& motion)
   out.add("outcome", "word", "outcome of the search; `settled`: the settled motion answers", word(motion.outcome.kind));
   out.text("reason", "why it failed, or what is undecided", motion.outcome.reason);
   out.add("kind", "kind of what attracts", motion.kind).column("kind");
-  out.add("stability", "verdict on the cycle found; empty: none was examined", motion.stability).column("stability");
+  out.add("stability", "verdict on the cycle, if one was examined", motion.stability).column("stability");
   out.add("frequency_hz", "Hz", "of the cycle, or of the strongest line", motion.frequency_hz).column("frequency_hz");
   out.add(fluctuating, "J", "mean energy about equilibrium", motion.energy.value).column(fluctuating);
   out.add("energy_error", "J", "of a settled motion: its error", motion.energy.error).column("energy_error");
@@ -82,7 +82,7 @@ void add_motion(Entry out, const SweptMotion& motion)
 
 void add_point(Entry out, const SweepPoint& point)
 {
-  add_place(out, "value of each number", point.values, point.reversed);
+  add_place(out, "value of each number", {point.values, point.reversed});
   out.add("outcome", "word", "`converged`, or how the point failed", word(point.outcome.kind));
   out.text("reason", "why it failed", point.outcome.reason);
   out.add("inserted", "switch", "between the scene's points, where pairs or modes change much", point.inserted);
@@ -106,13 +106,13 @@ void add_track(Entry out, const Track& track)
   out.show("least_mac", "-", "its least MAC", track.least_mac);
   out.show("greatest_growth_rate", "1/s", "its greatest growth rate", track.mode.lambda.real());
   out.show("frequency_hz", "Hz", "its frequency there", frequency_hz_of(track.mode.lambda));
-  add_place(out, "where that is", track.place.values, track.place.reversed);
+  add_place(out, "where that is", track.place);
 }
 
 void add_threshold(Entry out, const Threshold& threshold)
 {
-  add_place(out, "where a mode becomes unstable or stable along the first number", threshold.values,
-            threshold.reversed);
+  add_place(out, "where a mode becomes unstable or stable along the first number",
+            {threshold.values, threshold.reversed});
   out.show("error", "unit of the key", "length of the interval that holds the first value", threshold.error);
   out.show("track", "-", "number of the mode", threshold.track);
   out.show("frequency_hz", "Hz", "its frequency there", threshold.frequency_hz);
@@ -122,7 +122,7 @@ void add_threshold(Entry out, const Threshold& threshold)
 /// A mode of a point; null: the point has none.
 void add_mode(Entry out, const SweepPoint& point, const SweptMode* mode)
 {
-  add_line_place(out, point.values, point.reversed);
+  add_line_place(out, {point.values, point.reversed});
   out.add("inserted", "switch", "as `sweep.points[].inserted`", point.inserted);
   out.add("outcome", "word", "as `sweep.points[].outcome`", word(point.outcome.kind));
   out.add("closed_pairs", "-", "closed pairs", point.closed);
@@ -256,7 +256,7 @@ Result sweep_motions(const Sweep& sweep, const Scene& scene)
     if (point.motion)
     {
       const Entry row = Entry(rows, scene, Content::results).group("");
-      add_line_place(row, point.values, point.reversed);
+      add_line_place(row, {point.values, point.reversed});
       add_motion(row, *point.motion);
     }
   return rows;

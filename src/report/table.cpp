@@ -111,9 +111,9 @@ std::string columns_text(const Result& list)
 }
 
 /// "    frequency   4840.5 Hz   meaning"; a text needs no meaning.
-std::string value_row(const std::string& name, const Result& result, const Result* error, bool with_meaning)
+std::string value_row(const std::string& name, const Result& result, const Result* error, std::string meaning)
 {
-  std::string value = value_text(result.value, result), meaning = with_meaning ? result.meaning : "";
+  std::string value = value_text(result.value, result);
   if (value.empty()) return "";
   if (const std::string bar = error ? value_text(error->value, *error) : ""; !bar.empty()) value += " +- " + bar;
   if (const std::string unit = unit_text(result); !unit.empty()) value += " " + unit;
@@ -127,7 +127,7 @@ std::string value_row(const std::string& name, const Result& result, const Resul
 std::string group_text(const Result& group, const std::string& place)
 {
   std::string text;
-  const char* meaning = "";
+  std::string meaning; // of the row before: it is not said again
   for (auto part = group.parts.begin(); part != group.parts.end(); ++part)
   {
     const std::string name = place + (part->name == "mean" ? "" : (place.empty() ? "" : " ") + label(part->name));
@@ -135,7 +135,7 @@ std::string group_text(const Result& group, const std::string& place)
     {
       const auto next = std::next(part);
       const bool has_bar = next != group.parts.end() && next->place == Place::error_bar;
-      text += value_row(name, *part, has_bar ? &*next : nullptr, meaning != std::string(part->meaning));
+      text += value_row(name, *part, has_bar ? &*next : nullptr, meaning == part->meaning ? "" : part->meaning);
       meaning = part->meaning;
     }
     else if (part->kind == Kind::group)
