@@ -154,11 +154,13 @@ std::string csv_of(const Result& list)
   std::vector<Column> columns = columns_of(list);
   std::erase_if(columns, [](const Column& column) { return column.first->value.is_array(); });
   std::string text;
-  for (const Column& column : columns) text += (text.empty() ? "" : ",") + csv_text(column.first->name);
-  for (std::size_t row = 0; row < list.parts.size(); ++row)
-    for (const Column& column : columns)
-      text += (&column == &columns.front() ? "\n" : ",") + csv_cell(column.cells[row]);
-  return text + "\n";
+  const auto add = [&](const Column& column, const std::string& cell)
+  { text.append(&column == &columns.front() ? "" : ",").append(cell); };
+  for (const Column& column : columns) add(column, csv_text(column.first->name));
+  text += '\n';
+  for (std::size_t row = 0; row < list.parts.size(); ++row, text += '\n')
+    for (const Column& column : columns) add(column, csv_cell(column.cells[row]));
+  return text;
 }
 
 std::string column_unit(const Result& result)

@@ -145,7 +145,8 @@ std::string report_json(const Report& report, const Scene& scene)
 std::string result_page()
 {
   const Scene scene = full_scene();
-  const Result results = filled({}, scene, Content::example), modes = sweep_modes({}, scene, Content::example),
+  const Report none;
+  const Result results = filled(none, scene, Content::example), modes = sweep_modes({}, scene, Content::example),
                samples = robustness_samples({}, scene, Content::example);
   std::string columns;
   for (const auto& [group, stage, list] : result_columns)

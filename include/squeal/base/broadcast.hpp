@@ -11,11 +11,11 @@ namespace squeal
 /// Calls pass(bytes, count) for parts of the list that fit a message.
 template <class List, class Pass> void by_messages(List& list, Pass pass)
 {
-  using Entry = typename List::value_type;
-  static_assert(std::is_trivially_copyable_v<Entry>);
-  auto* const bytes = reinterpret_cast<char*>(const_cast<Entry*>(list.data()));
+  using Value = typename List::value_type;
+  static_assert(std::is_trivially_copyable_v<Value>);
+  auto* const bytes = reinterpret_cast<char*>(const_cast<Value*>(list.data()));
   constexpr std::size_t largest = 1 << 30;
-  for (std::size_t passed = 0, total = list.size() * sizeof(Entry); passed < total; passed += largest)
+  for (std::size_t passed = 0, total = list.size() * sizeof(Value); passed < total; passed += largest)
     pass(bytes + passed, static_cast<int>(std::min(largest, total - passed)));
 }
 
