@@ -141,8 +141,10 @@ Robustness run_robustness(const Model& model, const Scene& scene, const ProgramO
   std::vector<std::string> keys;
   for (const UncertainNumber& number : scene.uncertain) keys.push_back(number.key);
   const auto model_at = [&](std::span<const double> values) { return models.at(numbers_of(keys, values)); };
+  const auto friction_at = [&](std::span<const double> values)
+  { return friction_of_pairs(scene_with(scene, numbers_of(keys, values)), model.interface.geometry); };
   return find_robustness(
-      {*scene.robustness, scene.uncertain, model_at, scene.friction, scene.modes, options.modes, options.equilibrium},
+      {*scene.robustness, scene.uncertain, model_at, friction_at, scene.modes, options.modes, options.equilibrium},
       comm_of(model.structure.load));
 }
 

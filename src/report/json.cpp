@@ -44,6 +44,15 @@ Json equilibrium_entry(const Report& report, const Scene& scene)
   entry["force_residual"] = equilibrium.force_residual;
   entry["auxiliary_stiffness"] = equilibrium.auxiliary_stiffness;
   entry["uniqueness"] = word(equilibrium.uniqueness);
+  if (const auto& history = equilibrium.history)
+    entry["undriven_pairs"] = {{"increments", history->increments},
+                               {"change", history->change},
+                               {"open", history->open},
+                               {"stick", history->stick},
+                               {"slip", history->slip},
+                               {"at_limit", history->at_limit},
+                               {"index", history->index},
+                               {"reciprocal_condition", history->reciprocal_condition}};
   for (std::size_t i = 0; i < report.contacts.size(); ++i)
   {
     entry["contacts"].push_back({{"rotor", scene.contacts[i].rotor},
@@ -121,6 +130,7 @@ Json transient_entry(const Report& report)
   entry["frequency_bias"] = transient_bias(report).frequency;
   entry["normal_force_chatter"] = chatter(transient.history);
   entry["energy_defect_max"] = transient.energy_defect_max;
+  if (!transient.history.joint_work.empty()) entry["joint_work"] = transient.history.joint_work;
   entry["residual"] = transient.outcome.residual;
   entry["contact_iterations_mean"] = transient.contact_iterations_mean;
   entry["contact_steps_as_one"] = transient.contact_steps_as_one;

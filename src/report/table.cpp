@@ -60,6 +60,12 @@ std::string equilibrium_text(const Equilibrium& equilibrium, int pairs)
       row("", format("normal force %.9g N in all, %.4g to %.4g N a pair", normal.sum, normal.least, normal.greatest));
   text += row("", format("force residual %.1e, contact residual %.1e", equilibrium.force_residual,
                          equilibrium.outcome.residual));
+  if (const auto& history = equilibrium.history)
+    text +=
+        row("", format("undriven pairs: %d stick, %d slipped last, %d open, %d near their limit; %d increments, the "
+                       "last doubling of which changed reactions by %.1e",
+                       history->stick, history->slip, history->open, history->at_limit, history->increments,
+                       history->change));
   if (equilibrium.auxiliary_stiffness > 0)
     text +=
         row("", "a body is held by contact: solved with springs across the pairs, whose force is taken off exactly");

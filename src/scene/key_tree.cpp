@@ -38,7 +38,7 @@ bool is_absent(const SceneKey& key)
   {
     using Kind = std::remove_cvref_t<decltype(target)>;
     if constexpr (std::is_pointer_v<Kind>) return of_value(*target);
-    if constexpr (std::is_same_v<Kind, DampingTarget>) return !target.damping->has_value();
+    if constexpr (requires { target.part; }) return !target.part->has_value();
     if constexpr (std::is_same_v<Kind, TableTarget>) return target.size() == 0;
     return false;
   };

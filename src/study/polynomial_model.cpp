@@ -14,9 +14,13 @@ namespace
 constexpr double accepted = 1e-5; // error of M, C and K beside their size: growth rates are off by as much, at most
 constexpr double rounding = 1e-12;
 
+/// Whether a number is of a friction law: such laws are exact, and nothing else depends on them.
 bool is_friction(const std::string& key)
 {
-  return key.starts_with("friction.");
+  const auto ends_as = [&](const char* own) { return key.ends_with(own); };
+  return key.starts_with("friction.") ||
+         (key.starts_with("contact.") &&
+          (ends_as(".friction") || ends_as(".static_coefficient") || ends_as(".decay_speed")));
 }
 
 double size_of(Mat A)
@@ -195,15 +199,7 @@ std::vector<double> PolynomialModel::coefficients(const std::vector<double>& val
 
 void PolynomialModel::set_friction(const std::vector<double>& values)
 {
-  FrictionLaw& law = model_.interface.friction;
-  law = problem_.friction;
-  for (std::size_t i = 0; i < values.size(); ++i)
-  {
-    const std::string& key = problem_.numbers[i].key;
-    if (key == friction_coefficient_key) law.coefficient = values[i];
-    if (key == "friction.static_coefficient") law.static_coefficient = values[i];
-    if (key == "friction.decay_speed") law.decay_speed = values[i];
-  }
+  model_.interface.friction = problem_.friction_at(values);
 }
 
 const BrakeModel& PolynomialModel::at(const std::vector<double>& values)

@@ -215,8 +215,8 @@ MatrixXd friction_damping(const Interface& interface, const Equilibrium& equilib
   for (std::size_t i = 0; i < equilibrium.closed.size(); ++i)
   {
     if (!equilibrium.closed[i] || reactions.normal(i) <= 0) continue;
-    const SlidingFriction friction = sliding_friction(interface.friction, reactions.normal(i), drive.of(i));
-    const auto& D = interface.friction.direction_damping ? friction.damping : friction.damping_of_speed;
+    const SlidingFriction friction = sliding_friction(interface.friction.of(i), reactions.normal(i), drive.of(i));
+    const auto& D = interface.friction.common.direction_damping ? friction.damping : friction.damping_of_speed;
     const Index first = rows.tangential(static_cast<Index>(i));
     for (Index k = 0; k < rows.directions; ++k)
       for (Index l = 0; l < rows.directions; ++l)

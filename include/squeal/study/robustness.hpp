@@ -70,8 +70,8 @@ struct RobustnessProblem
 {
   const RobustnessSettings& settings;
   const std::vector<UncertainNumber>& numbers;
-  std::function<BrakeModel(std::span<const double> values)> model_at; // on MPI_COMM_SELF
-  FrictionLaw friction;                                               // of the scene
+  std::function<BrakeModel(std::span<const double> values)> model_at;      // on MPI_COMM_SELF
+  std::function<PairFriction(std::span<const double> values)> friction_at; // of the scene with these numbers
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;
