@@ -169,7 +169,7 @@ void StatusSystem::close(PairSystem& system, std::size_t pair, const StickSlipFr
   system.r.tail<2>() =
       (state.mu * (h + state.rho.normal * state.w[0]) - d.dot(state.r.tail<2>())) * d + (1 - a) * rest / size * across;
   system.w.tail<2>() = a * rest / (state.rho.tangential * size) * across;
-  system.W.block<2, 1>(1, 1) = d;
+  system.W.block<2, 1>(1, 1) = of_.directions == 1 ? Eigen::Vector2d(1, 0) : d; // no turn: the index keeps its sign
   system.W.block<2, 1>(1, 2) = (1 - a) * across;
   system.R.block<2, 1>(1, 2) = -a * state.rho.tangential * across;
 }
