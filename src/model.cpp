@@ -83,6 +83,7 @@ void hold(Model& model, const Elimination& elimination)
   for (Owned<Mat>* A : {&structure.G, &structure.H})
     if (A->get()) *A = elimination.square(*A);
   structure.load = elimination.entries(structure.load);
+  for (PathStep& step : structure.path) step.load = elimination.entries(step.load);
   model.interface.B = elimination.columns(model.interface.B);
   model.probes = elimination.columns(model.probes);
 }
@@ -104,6 +105,32 @@ void check_circulatory_part(const Scene& scene, const Model& model)
                 "pairs and load: take B, gap, drive and F out, or bring friction in by pairs");
 }
 
+/// The load at the end of a step of a scene, given as the scene that has it.
+using LoadOf = std::function<Owned<Vec>(const Scene& scene, const LoadStep& step)>;
+
+/// The steps to `load`, at which the last one ends.
+std::vector<PathStep> path_to(Vec load, const Scene& scene, const LoadOf& load_of)
+{
+  std::vector<PathStep> path;
+  for (const LoadStep& step : scene.steps)
+  {
+    Scene loaded = scene;
+    for (std::size_t i = 0; i < loaded.forces.size(); ++i)
+      loaded.forces[i].vector = step.load * (step.forces.empty() ? 1 : step.forces[i]) * loaded.forces[i].vector;
+    for (std::size_t i = 0; i < loaded.pressures.size(); ++i)
+      loaded.pressures[i].value *= step.load * (step.pressures.empty() ? 1 : step.pressures[i]);
+    const bool is_last = &step == &scene.steps.back();
+    path.push_back({step.name, is_last ? shared(load) : load_of(loaded, step), step.friction});
+  }
+  return path;
+}
+
+LoadOf load_of_mesh(const MeshPiece& piece, MPI_Comm comm)
+{
+  return [&piece, comm](const Scene& loaded, const LoadStep&)
+  { return assemble_load(piece.mesh, loaded, piece.dofs, comm); };
+}
+
 Model model_of_matrices(const Scene& scene, MPI_Comm comm)
 {
   Model model;
@@ -115,7 +142,16 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
   check(VecGetLocalSize(structure.load, &local_size));
   const MatrixRows rows = read_matrix_rows(*scene.matrices, size, comm);
   add_damping(structure, scene.damping);
+  const Owned<Vec> given = copy_of(structure.load.get());
   add_forces(rows, scene.forces, structure.load);
+  structure.path = path_to(structure.load, scene,
+                           [&](const Scene& loaded, const LoadStep& step)
+                           {
+                             Owned<Vec> load = copy_of(given.get());
+                             check(VecScale(load, step.load));
+                             add_forces(rows, loaded.forces, load);
+                             return load;
+                           });
   model.probes = probe_rows(scene.probes, rows, local_size, comm);
   const auto held = held_rows(rows, scene.supports);
   name_rows(rows, held, structure.names);
@@ -124,6 +160,14 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
   hold(model, Elimination(held, structure.load));
   check_interface(model.interface, scene.matrices->string(), comm);
   return model;
+}
+
+/// A path that shares its loads with this one.
+std::vector<PathStep> sharing(const std::vector<PathStep>& path)
+{
+  std::vector<PathStep> result;
+  for (const PathStep& step : path) result.push_back({step.name, shared(step.load.get()), step.driven_friction});
+  return result;
 }
 
 /// Structure and contact that share all matrices with these.
@@ -138,6 +182,7 @@ BrakeModel sharing(const Structure& own, const Interface& contact)
     structure.*matrix = shared((own.*matrix).get());
   structure.loss_omega = own.loss_omega;
   structure.load = shared(own.load.get());
+  structure.path = sharing(own.path);
   structure.elements = own.elements;
   structure.names = own.names;
   return result;
@@ -198,6 +243,7 @@ Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
   ContactPairs contact;
   MeshPiece piece = numbered(scene, std::move(mesh), contact, comm);
   model.structure = assemble(piece, scene, comm);
+  model.structure.path = path_to(model.structure.load, scene, load_of_mesh(piece, comm));
   model.interface = make_interface(contact.pairs, scene, piece.dofs, comm);
   model.coverage = contact.coverage;
   model.probes = probe_rows(scene.probes, piece.mesh, piece.dofs, comm);
@@ -305,10 +351,14 @@ BrakeModel NearbyModels::made_of_mesh(const Scene& scene, const std::set<Effect>
   if (stiffness_of) structure.G = shared(stiffness_of->structure.G.get());
   if (loss_of) structure.K_loss = shared(loss_of->structure.K_loss.get());
   if (load_of)
+  {
     structure.load = shared(load_of->structure.load.get());
+    structure.path = sharing(load_of->structure.path);
+  }
   else
   {
     structure.load = assemble_load(piece(scene).mesh, scene, piece(scene).dofs, comm_);
+    structure.path = path_to(structure.load, scene, load_of_mesh(piece(scene), comm_));
     ++made_.load;
   }
   if (contact_of)
@@ -339,7 +389,7 @@ BrakeModel NearbyModels::at(std::span<const SceneNumber> numbers)
   else if (!std::ranges::all_of(from_last, is_friction))
     last_.model = made_from_files(scene);
   Interface& interface = last_.model.interface;
-  interface.friction = scene.friction;
+  interface.friction = friction_of_pairs(scene, interface.geometry);
   check_interface(interface, "contact", comm_);
   last_.values = std::move(values);
   return sharing(last_.model.structure, interface);

@@ -1,5 +1,6 @@
 #include "squeal/point.hpp"
 
+#include "squeal/mesh/names.hpp"
 #include "squeal/modes/modes_checkpoint.hpp"
 
 namespace squeal
@@ -17,6 +18,43 @@ bool starts_without_a_mode(const TransientSettings& settings)
 bool follows_a_mode(const TransientSettings& settings)
 {
   return settings.enabled && (!starts_without_a_mode(settings) || settings.steps == 0);
+}
+
+/// Sets the motions of one entry. On rank 0, which has the mesh.
+void set_initial_motion(const Model& model, const InitialMotion& initial, const State& state)
+{
+  for (const int node : named_nodes(model.mesh, initial.on, "initial"))
+    for (int c = 0; c < 3; ++c)
+    {
+      const double u = initial.displacement[c], v = initial.velocity[c];
+      if (u == 0 && v == 0) continue;
+      const std::span<const DofTerm> terms = model.dofs.terms_of(6 * PetscInt{node} + c);
+      if (terms.size() != 1 || terms[0].factor != 1)
+        throw Error("initial on " + initial.on + ": its motion " + motion_words[static_cast<std::size_t>(c)] +
+                    (terms.empty() ? " is held: give it no displacement and velocity there"
+                                   : " follows other nodes: name the group, point or body that these are of"));
+      check(VecSetValue(state.u, terms[0].dof, u, INSERT_VALUES));
+      check(VecSetValue(state.v, terms[0].dof, v, INSERT_VALUES));
+    }
+}
+
+/// Adds the scene's initial motions to a state. Collective.
+void add_initial_motions(const Model& model, const Scene& scene, State& state)
+{
+  if (scene.initial.empty()) return;
+  State added{zeros_like(state.u), zeros_like(state.v), 0, {}};
+  on_rank_zero(comm_of(state.u),
+               [&]
+               {
+                 for (const InitialMotion& initial : scene.initial) set_initial_motion(model, initial, added);
+               });
+  for (Vec x : {added.u.get(), added.v.get()})
+  {
+    check(VecAssemblyBegin(x));
+    check(VecAssemblyEnd(x));
+  }
+  check(VecAXPY(state.u, 1, added.u));
+  check(VecAXPY(state.v, 1, added.v));
 }
 
 std::string no_oscillation_among(const SlidingPoint& point, std::span<const ComplexMode> modes)
@@ -135,8 +173,9 @@ Trajectory find_transient(const SlidingPoint& point, const Scene& scene, const P
     return not_run<Trajectory>(OutcomeKind::skipped, reason);
   const ComplexMode* followed = reason.empty() ? &point.modes.modes.front() : nullptr;
   const UnstableModes started{followed_modes(point, scene), point.estimates};
-  return integrate(point.sliding(), followed, settings, options.step,
-                   transient_start(point.sliding(), started, settings), point.model->probes);
+  State start = transient_start(point.sliding(), started, settings);
+  add_initial_motions(*point.model, scene, start);
+  return integrate(point.sliding(), followed, settings, options.step, std::move(start), point.model->probes);
 }
 
 } // namespace squeal

@@ -5,6 +5,7 @@
 #include "squeal/coarse.hpp"
 #include "squeal/forecast.hpp"
 #include "squeal/reduction/model_files.hpp"
+#include "squeal/scene/numbers.hpp"
 #include "squeal/studies.hpp"
 
 #include <algorithm>
@@ -97,6 +98,30 @@ std::optional<CoarseModel> check_starts(const Scene& scene, const Model& model, 
   return coarse;
 }
 
+/// Throws Error where the scene asks for a stage that does not know pairs without a drive yet.
+void refuse_undriven_pairs(const Scene& scene, const Interface& interface)
+{
+  if (!has_undriven_pairs(interface)) return;
+  std::size_t pair = 0;
+  while (!is_undriven(interface, pair)) ++pair;
+  const std::string contact =
+      interface.geometry.empty()
+          ? format("pair %zu of drive.petsc", pair)
+          : "the contact of " + contact_names(scene)[static_cast<std::size_t>(interface.geometry[pair].contact)];
+  const auto refuse = [&](bool asked, const char* stage, const char* remedy)
+  {
+    if (asked)
+      throw Error(scene.file.string() + ": " + stage + " does not know pairs without a drive yet, and " + contact +
+                  " has some: " + remedy + ", or give the contact a velocity, or friction = 0");
+  };
+  refuse(scene.cycle.enabled, "[cycle]", "set cycle.enabled = false");
+  refuse(scene.modes.reduced_matrices, "[modes] reduced_matrices", "set it to false");
+  refuse(scene.sweep && scene.sweep->stages != SweepStages::equilibrium, "[sweep] of modes or cycles",
+         "set sweep.stages = \"equilibrium\"");
+  refuse(scene.sensitivity.has_value(), "[sensitivity]", "take it out");
+  refuse(scene.robustness.has_value(), "[robustness]", "take it out");
+}
+
 void print_model(const ModelSummary& model, MPI_Comm comm)
 {
   if (rank_of(comm) == 0)
@@ -118,6 +143,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   if (!runner(Stage::model, [&] { return model = build_model(scene, comm), false; }).empty()) throw Interrupted{};
   report.model = summary_with_doubts(model, scene, comm);
   print_model(report.model, comm);
+  refuse_undriven_pairs(scene, model.interface);
   const std::optional<CoarseModel> coarse = check_starts(scene, model, comm);
   end_if_asked(comm);
   const Forecast forecast = forecast_of(model, scene, options);
@@ -171,6 +197,7 @@ void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
   if (rank_of(comm) == 0)
     std::printf("# the scene, every default written out\n%s\n# the model\n", resolved_scene(scene).c_str());
   print_model(summary_with_doubts(model, scene, comm), comm);
+  refuse_undriven_pairs(scene, model.interface);
   (void)check_starts(scene, model, comm);
   const Forecast forecast = forecast_of(model, scene, options);
   if (rank_of(comm) == 0) std::printf("%s", text_of(forecast).c_str());

@@ -42,7 +42,7 @@ std::vector<double> first_problem(const ThetaStep& step, const Structure& struct
 }
 
 /// Seconds of contact alone from r = 0, and the sweeps.
-std::pair<double, int> cold_contact(const ThetaStep& step, const FrictionLaw& friction, const std::vector<double>& b,
+std::pair<double, int> cold_contact(const ThetaStep& step, const PairFriction& friction, const std::vector<double>& b,
                                     ContactSolver solver)
 {
   const ServedProducts served(step.W);

@@ -271,7 +271,7 @@ bool may_reduce(const BrakeBranchProblem& problem)
   const PairsSeen seen = pairs_seen_in(problem, 1);
   const std::size_t active = seen.roles({}).active.size();
   const PairRows<std::size_t> rows(problem.sliding.interface.directions);
-  return active > 0 && problem.sliding.interface.friction.decay_speed == 0 &&
+  return active > 0 && !depends_on_speed(problem.sliding.interface.friction) &&
          is_far_smaller(problem, 2 * problem.own_modes.size() + rows.rows_of(active));
 }
 

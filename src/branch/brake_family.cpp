@@ -63,7 +63,7 @@ void BrakeFamily::set_parameter(double parameter)
   if (at_ && friction_) // A and W do not depend on it
   {
     at_->parameter = parameter;
-    at_->model.interface.friction.coefficient = parameter;
+    at_->model.interface.friction.common.coefficient = parameter;
     at_->map.recorded_start = {}; // what is recorded belongs to the other friction
     at_->equilibrium_known = false;
     return;
@@ -123,7 +123,7 @@ PointMeasures BrakeFamily::measure(const Orbit& orbit)
   PointMeasures measures{measured.mean_energy, measured.mean_fluctuating_energy, std::move(measured.peak_to_peak),
                          measured.open_pairs_mean};
   count_statuses(measured.statuses, measures);
-  measures.slips_nonlinearly = at_->model.interface.friction.decay_speed > 0;
+  measures.slips_nonlinearly = depends_on_speed(at_->model.interface.friction);
   return measures;
 }
 

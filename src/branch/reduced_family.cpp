@@ -76,8 +76,14 @@ ReducedBrake combined(const std::vector<ReducedBrake>& samples, const std::vecto
   }
   model.force = sum([](const ReducedBrake& b) -> const VectorXd& { return b.model.force; });
   model.friction = like.model.friction;
-  for (const auto part : {&FrictionLaw::coefficient, &FrictionLaw::static_coefficient, &FrictionLaw::decay_speed})
-    model.friction.*part = sum([part](const ReducedBrake& b) { return b.model.friction.*part; });
+  const auto set_law = [&](FrictionLaw& law, const auto& of)
+  {
+    for (const auto part : {&FrictionLaw::coefficient, &FrictionLaw::static_coefficient, &FrictionLaw::decay_speed})
+      law.*part = sum([&](const ReducedBrake& b) { return of(b.model.friction).*part; });
+  };
+  set_law(model.friction.common, [](const PairFriction& f) -> const FrictionLaw& { return f.common; });
+  for (std::size_t k = 0; k < model.friction.own.size(); ++k)
+    set_law(model.friction.own[k], [k](const PairFriction& f) -> const FrictionLaw& { return f.own[k]; });
   model.active = like.model.active;
   model.directions = like.model.directions;
   model.gap = like.model.gap;
@@ -133,7 +139,8 @@ VectorXd sliding_reactions(const ReducedModel& model)
   for (std::size_t i = 0; i < r.pairs(); ++i)
   {
     const double speed = length(drive.of(i));
-    const double friction = speed > 0 ? friction_coefficient(model.friction, speed).value * r.normal(i) / speed : 0;
+    const double friction =
+        speed > 0 ? friction_coefficient(model.friction.of(i), speed).value * r.normal(i) / speed : 0;
     for (std::size_t k = 0; k < drive.of(i).size(); ++k) r.tangential(i)[k] = friction * drive.of(i)[k];
   }
   return reactions;
@@ -369,7 +376,7 @@ PointMeasures ReducedFamily::measure(const Orbit& orbit)
     statuses.push_back(contact_status(PairView<const double>(contact.r, model.directions),
                                       PairView<const double>(contact.w, model.directions), model.friction));
   count_statuses(statuses, measures);
-  measures.slips_nonlinearly = model.friction.decay_speed > 0;
+  measures.slips_nonlinearly = depends_on_speed(model.friction);
   double open = 0;
   for (const auto& status : statuses)
     open += static_cast<double>(std::count(status.begin(), status.end(), ContactStatus::open));

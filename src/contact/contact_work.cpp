@@ -16,7 +16,7 @@ double largest_reaction(const std::vector<double>& r)
 
 double defect_of(const ContactWork& work, std::size_t pair, const PairVector& w, double largest)
 {
-  const double defect = natural_map(work.reaction(pair), w, work.friction, work.W.scale(pair));
+  const double defect = natural_map(work.reaction(pair), w, work.friction.of(pair), work.W.scale(pair));
   if (!std::isfinite(defect + w[0] + w[1] + w[2])) return std::numeric_limits<double>::infinity();
   return defect > 0 ? defect / work.scale_of(pair, largest) : 0;
 }

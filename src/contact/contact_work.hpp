@@ -9,7 +9,7 @@ namespace squeal
 struct ContactWork
 {
   const ContactOperator& W;
-  const FrictionLaw& friction;
+  const PairFriction& friction;
   const std::vector<double>& b;
   std::vector<double>& r;
   std::vector<double> Wr; // at the last product with W

@@ -80,7 +80,7 @@ template <class Entry> double visit(SweptProblem<Entry>& problem, std::size_t pa
   const double defect = defect_of(work, pair, w, largest);
   if (defect <= limit) return 0;
   const PairBlock& A = W.diagonal(pair);
-  PairVector next = solve_pair(A, velocity_without(A, last, w), W.directions(), work.friction, last);
+  PairVector next = solve_pair(A, velocity_without(A, last, w), W.directions(), work.friction.of(pair), last);
   if (problem.relaxation < 1) // stays admissible: the cone is convex
     for (std::size_t k = 0; k < next.size(); ++k) next[k] = last[k] + problem.relaxation * (next[k] - last[k]);
   return change_reaction(problem, pair, next) ? defect : 0;
@@ -263,8 +263,10 @@ void begin(const Problems<Entry>& problems, const SweptPairs& where, const Conta
     ContactWork& work = problem->work;
     problem->known = work.r;
     where.for_each_own(
-        [&](std::size_t pair) {
-          change_reaction(*problem, pair, admissible(work.reaction(pair), velocity_of(*problem, pair), work.friction));
+        [&](std::size_t pair)
+        {
+          change_reaction(*problem, pair,
+                          admissible(work.reaction(pair), velocity_of(*problem, pair), work.friction.of(pair)));
         });
   }
   for (const Turn& turn : where.turns) act_on_other_patches(problems, where, turn);
@@ -339,9 +341,17 @@ struct Announced
 {
   std::size_t problems = 0;
   ContactSettings settings{};
-  FrictionLaw friction{};
 };
 static_assert(std::is_trivially_copyable_v<Announced>);
+
+/// The laws that rank 0 has.
+PairFriction announced_friction(PairFriction friction, MPI_Comm comm)
+{
+  MPI_Bcast(&friction.common, sizeof friction.common, MPI_BYTE, 0, comm);
+  broadcast(friction.own, comm);
+  broadcast(friction.number_of_own, comm);
+  return friction;
+}
 
 /// Exchanges the problems in one message: the speed, b, r and W r of each.
 void exchange(std::span<ContactWork* const> works, std::span<std::vector<double>> b, MPI_Comm comm)
@@ -376,8 +386,9 @@ void sweep_together(std::span<ContactWork* const> works, const ContactSettings& 
   const MPI_Comm comm = first.W.shared_by();
   int task = task_of_sweeps;
   MPI_Bcast(&task, 1, MPI_INT, 0, comm);
-  Announced announced{works.size(), settings, first.friction};
+  Announced announced{works.size(), settings};
   MPI_Bcast(&announced, sizeof announced, MPI_BYTE, 0, comm);
+  (void)announced_friction(first.friction, comm);
   exchange(works, {}, comm);
   sweep_until_converged<float>(works, patches_of(first.W), settings);
 }
@@ -405,12 +416,13 @@ void sweep_along(const ContactOperator& W)
 {
   Announced announced;
   MPI_Bcast(&announced, sizeof announced, MPI_BYTE, 0, W.shared_by());
+  const PairFriction friction = announced_friction({}, W.shared_by());
   std::vector<std::vector<double>> b(announced.problems), r(announced.problems);
   std::vector<ContactWork> works;
   works.reserve(announced.problems);
   std::vector<ContactWork*> all;
   for (std::size_t k = 0; k < announced.problems; ++k)
-    all.push_back(&works.emplace_back(ContactWork{W, announced.friction, b[k], r[k], {}}));
+    all.push_back(&works.emplace_back(ContactWork{W, friction, b[k], r[k], {}}));
   exchange(all, b, W.shared_by());
   sweep_until_converged<float>(all, patches_of(W), announced.settings);
 }

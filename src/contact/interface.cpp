@@ -108,21 +108,13 @@ void check_interface(const Interface& interface, const std::string& source, MPI_
                              "contact";
                });
   agree(comm, problem);
-  for (int pair = 0; pair < interface.pairs; ++pair)
-  {
-    const double speed = drive_speed(interface, static_cast<std::size_t>(pair));
-    if (speed == 0 && friction_coefficient(interface.friction, speed).value != 0)
-      throw Error(source + ": " + where(interface, pair) +
-                  " has no tangential drive velocity: friction has no direction there; give a velocity or move the " +
-                  "axis of rotation, or set friction.coefficient = 0");
-  }
 }
 
 Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& scene, const DofMap& dofs, MPI_Comm comm)
 {
   Interface interface;
   interface.pairs = static_cast<int>(pairs.size());
-  interface.friction = scene.friction;
+  interface.friction = friction_of_pairs(scene, pairs);
   interface.directions = 1;
   bool compliant = false;
   for (const Contact& contact : scene.contacts)
@@ -246,7 +238,7 @@ std::vector<double> contact_velocity(const Interface& interface, Vec v)
 
 std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions, Vec v)
 {
-  if (interface.friction.decay_speed == 0) return contact_status(interface, reactions, std::vector<double>{});
+  if (!depends_on_speed(interface.friction)) return contact_status(interface, reactions, std::vector<double>{});
   return contact_status(interface, reactions, contact_velocity(interface, v));
 }
 
@@ -260,6 +252,18 @@ void add_reactions(const Interface& interface, const std::vector<double>& r, Vec
 double drive_speed(const Interface& interface, std::size_t pair)
 {
   return length(TangentView(interface.drive, interface.directions).of(pair));
+}
+
+bool is_undriven(const Interface& interface, std::size_t pair)
+{
+  return drive_speed(interface, pair) == 0 && friction_coefficient(interface.friction.of(pair), 0).value > 0;
+}
+
+bool has_undriven_pairs(const Interface& interface)
+{
+  for (std::size_t pair = 0; pair < interface.gap.size(); ++pair)
+    if (is_undriven(interface, pair)) return true;
+  return false;
 }
 
 std::vector<double> drive_directions(const Interface& interface)
@@ -311,7 +315,7 @@ std::vector<double> drive_friction(const Interface& interface)
 {
   std::vector<double> mu;
   for (std::size_t pair = 0; pair < static_cast<std::size_t>(interface.pairs); ++pair)
-    mu.push_back(friction_coefficient(interface.friction, drive_speed(interface, pair)).value);
+    mu.push_back(friction_coefficient(interface.friction.of(pair), drive_speed(interface, pair)).value);
   return mu;
 }
 

@@ -270,14 +270,17 @@ ContactStatus contact_status(const PairVector& r, const PairVector& w, const Fri
 }
 
 std::vector<ContactStatus> contact_status(PairView<const double> reactions, PairView<const double> w,
-                                          const FrictionLaw& law)
+                                          const PairFriction& friction)
 {
   double largest = 0;
   for (std::size_t pair = 0; pair < reactions.pairs(); ++pair) largest = std::max(largest, reactions.normal(pair));
   std::vector<ContactStatus> status;
   for (std::size_t pair = 0; pair < reactions.pairs(); ++pair)
+  {
+    const FrictionLaw& law = friction.of(pair);
     status.push_back(
         contact_status(reactions.vector(pair), law.decay_speed == 0 ? PairVector{} : w.vector(pair), law, largest));
+  }
   return status;
 }
 

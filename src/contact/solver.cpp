@@ -22,7 +22,7 @@ void project(ContactWork& work, double rho)
     const PairVector w = work.velocity(pair);
     PairVector next = r.vector(pair);
     for (std::size_t k = 0; k < next.size(); ++k) next[k] -= rho * w[k];
-    r.set(pair, admissible(next, w, work.friction));
+    r.set(pair, admissible(next, w, work.friction.of(pair)));
   }
 }
 
@@ -49,7 +49,7 @@ void fixed_point(ContactWork& work, const ContactSettings& settings)
   result.converged = result.residual <= settings.tolerance;
 }
 
-ContactWork start(const ContactOperator& W, const FrictionLaw& friction, const ContactProblem& problem)
+ContactWork start(const ContactOperator& W, const PairFriction& friction, const ContactProblem& problem)
 {
   if (problem.b.size() != W.size())
     throw Error("contact: " + std::to_string(problem.b.size()) + " velocities for " + std::to_string(W.size()) +
@@ -104,7 +104,7 @@ void remember(const ContactWork& work, ContactMemory& memory)
 
 } // namespace
 
-std::vector<ContactResult> solve_contacts(const ContactOperator& W, const FrictionLaw& friction,
+std::vector<ContactResult> solve_contacts(const ContactOperator& W, const PairFriction& friction,
                                           const ContactSettings& settings, std::span<const ContactProblem> problems)
 {
   std::vector<ContactWork> works;
@@ -139,7 +139,7 @@ std::vector<ContactResult> solve_contacts(const ContactOperator& W, const Fricti
   return results;
 }
 
-double contact_residual(const ContactOperator& W, const FrictionLaw& friction, const std::vector<double>& b,
+double contact_residual(const ContactOperator& W, const PairFriction& friction, const std::vector<double>& b,
                         const std::vector<double>& r)
 {
   std::vector<double> reactions = r;

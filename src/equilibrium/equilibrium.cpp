@@ -1,7 +1,8 @@
 #include "squeal/equilibrium/equilibrium.hpp"
 #include "squeal/base/run_control.hpp"
 
-#include "held_stiffness.hpp"
+#include "balance.hpp"
+#include "load_path.hpp"
 #include "squeal/algebra/lent_cores.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/petsc.hpp"
@@ -118,25 +119,6 @@ StatusSolution find_split(const ComplementarityProblem& problem, const Interface
   StatusSolution again = solve_by_status(problem, std::move(closed), most_splits);
   again.iterations += solution.iterations;
   return again;
-}
-
-/// Sets the force residual. Returns whether it is small, or at the rounding of K u: a soft support lets u be large
-/// beside the strains.
-bool balances(const Structure& structure, const Interface& interface, Equilibrium& equilibrium)
-{
-  const auto residual = zeros_like(structure.load);
-  double load = 0, stress = 0, defect = 0, stiffness = 0, motion = 0;
-  check(MatMult(structure.K, equilibrium.u, residual));
-  check(VecNorm(residual, NORM_2, &stress));
-  check(VecScale(residual, -1));
-  check(VecAXPY(residual, 1, structure.load));
-  if (interface.pairs > 0) add_reactions(interface, equilibrium.reactions, residual);
-  check(VecNorm(residual, NORM_2, &defect));
-  check(VecNorm(structure.load, NORM_2, &load));
-  check(VecNorm(equilibrium.u, NORM_2, &motion));
-  check(MatNorm(structure.K, NORM_INFINITY, &stiffness));
-  equilibrium.force_residual = defect == 0 ? 0 : defect / (load > 0 ? load : stress);
-  return equilibrium.force_residual <= 1e-9 || defect <= 4 * PETSC_MACHINE_EPSILON * stiffness * motion;
 }
 
 /// sign c r added to the gaps: of a pair with a compliance c the law holds for g + c r.
@@ -388,6 +370,7 @@ Equilibrium Equilibria::at(const Structure& structure, const Interface& interfac
     equilibrium.outcome = {OutcomeKind::converged, "", 0, 0};
     return equilibrium;
   }
+  if (has_undriven_pairs(interface)) return at_end_of_path(structure, interface);
   if (!kept_ || !kept_->serves(structure, interface))
   {
     kept_.reset(); // before the next is made: both may be large
@@ -397,6 +380,17 @@ Equilibrium Equilibria::at(const Structure& structure, const Interface& interfac
   equilibrium = find_with(*kept_, structure, interface, expected_);
   if (equilibrium.outcome.kind == OutcomeKind::converged) expected_ = equilibrium.closed;
   return equilibrium;
+}
+
+Equilibrium Equilibria::at_end_of_path(const Structure& structure, const Interface& interface)
+{
+  if (!path_kept_ || path_kept_->K.get() != structure.K || path_kept_->B.get() != interface.B)
+  {
+    path_kept_.reset(); // before the next is made: both may be large
+    path_kept_ = std::make_unique<PathOperators>(path_operators(structure, interface, options_));
+    ++factors_;
+  }
+  return find_by_path(*path_kept_, structure, interface);
 }
 
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)

@@ -150,6 +150,23 @@ Held hold(const Structure& structure, const Interface& interface, const FactorOp
   return held;
 }
 
+Held hold_by_all_rows(const Structure& structure, const Interface& interface, const FactorOptions& options)
+{
+  constexpr double part = 1e-2; // of the structure's stiffness: long chains of bodies lose digits by more
+  Held held;
+  held.kappa = part * typical_stiffness(structure.K);
+  check(MatTransposeMatMult(interface.B, interface.B, MAT_INITIAL_MATRIX, PETSC_DEFAULT, held.augmented.put()));
+  check(MatScale(held.augmented, held.kappa));
+  check(MatAXPY(held.augmented, 1, structure.K, DIFFERENT_NONZERO_PATTERN));
+  check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
+  Factored factored = factor_positive(held.augmented, interface, options);
+  if (factored.loose)
+    throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
+                describe(structure.names, *factored.loose, comm_of(structure.K)) + "; give it a support or a spring");
+  held.factor = std::move(factored.factor);
+  return held;
+}
+
 GapCompliance gap_compliance(const Factor& factor, int pairs, MPI_Comm comm)
 {
   GapCompliance D;

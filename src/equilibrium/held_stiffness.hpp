@@ -18,6 +18,10 @@ struct Held
 /// Error: a body that neither supports nor contact hold (which one).
 Held hold(const Structure& structure, const Interface& interface, const FactorOptions& options);
 
+/// K + kappa B'B with springs across every row of the pairs: of structures that may hang on friction alone, which holds
+/// bodies along their contacts, too. Error: a body that contact does not hold either (which one).
+Held hold_by_all_rows(const Structure& structure, const Interface& interface, const FactorOptions& options);
+
 /// What reactions do to gaps, pairs x pairs: D_nn of normal ones, D_nt of friction along the axes. On rank 0.
 struct GapCompliance
 {

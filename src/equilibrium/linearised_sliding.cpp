@@ -26,13 +26,50 @@ using Row = std::map<PetscInt, Coefficients>;
 // The rows that hold a column. A row loses none but its pivots' columns, which no row takes again.
 using Holders = std::map<PetscInt, std::vector<std::size_t>>;
 
-// The rows of B of the closed pairs, whole on every rank: they are few, and the elimination is the same everywhere.
-std::vector<Row> read_rows(const Interface& interface, const std::vector<int>& pairs)
+// A row that is eliminated: of a pair that slides its normal one, with friction in the other basis, of one that sticks
+// all of them, alike in both.
+struct HeldRow
+{
+  int pair;
+  PetscInt component; // 0: normal
+};
+
+// Of the closed pairs, those of driven pairs first: rows that these imply are left out.
+std::vector<HeldRow> held_rows(const Interface& interface, const std::vector<char>& closed)
+{
+  std::vector<HeldRow> sliding, sticking;
+  for (int pair = 0; pair < interface.pairs; ++pair)
+  {
+    const auto i = static_cast<std::size_t>(pair);
+    if (!closed[i]) continue;
+    const bool rigid = compliance_of(interface, i) == 0, sticks = is_undriven(interface, i);
+    if (rigid) (sticks ? sticking : sliding).push_back({pair, 0});
+    for (int k = 1; sticks && k <= interface.directions; ++k) sticking.push_back({pair, k});
+  }
+  sliding.insert(sliding.end(), sticking.begin(), sticking.end());
+  return sliding;
+}
+
+// Those rows of B, whole on every rank: they are few, and the elimination is the same everywhere.
+std::vector<Row> read_rows(const Interface& interface, const std::vector<HeldRow>& held)
 {
   const PairRows<PetscInt> rows(interface.directions);
+  struct Source
+  {
+    PetscInt row; // of B
+    std::size_t held;
+    PetscInt component;
+  };
+  std::vector<Source> sources;
+  for (std::size_t i = 0; i < held.size(); ++i)
+  {
+    const auto [pair, component] = held[i];
+    const PetscInt last = is_undriven(interface, static_cast<std::size_t>(pair)) ? component : rows.directions;
+    for (PetscInt k = component; k <= last; ++k) sources.push_back({rows.normal(pair) + k, i, k});
+  }
+  std::ranges::sort(sources, {}, &Source::row); // as PETSc needs them
   std::vector<PetscInt> indices;
-  for (const int pair : pairs)
-    for (PetscInt k = 0; k < rows.per_pair(); ++k) indices.push_back(rows.normal(pair) + k);
+  for (const Source& source : sources) indices.push_back(source.row);
   PetscInt dofs = 0;
   check(MatGetSize(interface.B, nullptr, &dofs));
   Owned<IS> row_set, column_set;
@@ -44,19 +81,19 @@ std::vector<Row> read_rows(const Interface& interface, const std::vector<int>& p
   check(MatCreateSubMatrices(interface.B, 1, &wanted_rows, &wanted_columns, MAT_INITIAL_MATRIX, &parts));
   const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
   const TangentView e(directions, interface.directions);
-  std::vector<Row> result(pairs.size());
+  std::vector<Row> result(held.size());
   for_each_row(parts[0],
                [&](PetscInt row, std::span<const PetscInt> column, std::span<const PetscScalar> value)
                {
-                 const auto i = static_cast<std::size_t>(rows.pair_of(row)), pair = static_cast<std::size_t>(pairs[i]);
-                 const bool normal = rows.is_normal(row);
-                 const auto k = static_cast<std::size_t>(rows.component_of(row));
-                 const double weight = normal ? 1 : mu[pair] * e.of(pair)[k - 1];
+                 const auto [of_B, i, component] = sources[static_cast<std::size_t>(row)];
+                 const auto pair = static_cast<std::size_t>(held[i].pair);
+                 const bool own = component == held[i].component; // else friction that follows the normal row
+                 const double weight = own ? 1 : mu[pair] * e.of(pair)[static_cast<std::size_t>(component - 1)];
                  for (std::size_t j = 0; j < column.size(); ++j)
                  {
                    if (value[j] == 0) continue;
                    Coefficients& entry = result[i][column[j]];
-                   if (normal) entry.normal += value[j];
+                   if (own) entry.normal += value[j];
                    entry.sliding += weight * value[j];
                  }
                });
@@ -111,8 +148,19 @@ double size_of(const Row& row)
   return largest;
 }
 
-// Gauss-Jordan: on return row i holds 1 at pivots[i], and no other row holds that column.
-std::vector<PetscInt> eliminate(std::vector<Row>& rows, const std::vector<int>& pairs, PetscInt dofs)
+// Leaves out a row of a pair that sticks where the rows before it imply it in both bases. Returns whether they do.
+bool leave_out_implied(std::vector<Row>& rows, std::size_t i, PetscInt dofs, double vanishing, Holders& holders)
+{
+  for (const auto& [column, value] : rows[i])
+    if (column < dofs && std::max(std::abs(value.normal), std::abs(value.sliding)) > vanishing) return false;
+  for (const auto& [column, value] : rows[i]) std::erase(holders.at(column), i);
+  rows[i].clear();
+  return true;
+}
+
+// Gauss-Jordan: on return row i holds 1 at pivots[i], and no other row holds that column; -1: the row is left out.
+std::vector<PetscInt> eliminate(std::vector<Row>& rows, const std::vector<HeldRow>& held, const Interface& interface,
+                                PetscInt dofs)
 {
   Holders holders;
   std::vector<double> size(rows.size());
@@ -126,8 +174,14 @@ std::vector<PetscInt> eliminate(std::vector<Row>& rows, const std::vector<int>& 
   for (std::size_t i = 0; i < rows.size(); ++i)
   {
     const PetscInt pivot = choose_pivot(rows[i], holders, dofs, 1e-10 * size[i]);
+    const bool sticks = is_undriven(interface, static_cast<std::size_t>(held[i].pair));
+    if (pivot < 0 && sticks && leave_out_implied(rows, i, dofs, 1e-10 * size[i], holders))
+    {
+      pivots.push_back(-1);
+      continue;
+    }
     if (pivot < 0)
-      throw Error("contact pair " + std::to_string(pairs[i]) +
+      throw Error("contact pair " + std::to_string(held[i].pair) +
                   " cannot be eliminated: the other closed pairs or the supports already fix its normal motion, or the "
                   "friction coefficient jams it; remove the pair, or free one of its nodes");
     const Coefficients scale = rows[i].at(pivot);
@@ -202,10 +256,10 @@ Owned<Mat> assemble_basis(const Elimination& elimination, double Coefficients::*
   return result;
 }
 
-// R'[pivots] lambda = f[pivots], and the elimination found T with T R[pivots] = I: lambda = T' f[pivots]. Likewise of
-// B_n.
+// R'[pivots] lambda = f[pivots], and the elimination found T with T R[pivots] = I: lambda = T' f[pivots], of which the
+// normal ones are taken. Likewise of B_n.
 Owned<Mat> assemble_reaction(const std::vector<Row>& rows, double Coefficients::*kind,
-                             const std::vector<PetscInt>& pivots, const std::vector<int>& pairs,
+                             const std::vector<PetscInt>& pivots, const std::vector<HeldRow>& held,
                              const Interface& interface)
 {
   PetscInt first = 0, last = 0, dofs = 0;
@@ -220,8 +274,8 @@ Owned<Mat> assemble_reaction(const std::vector<Row>& rows, double Coefficients::
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (pivots[i] >= first && pivots[i] < last)
       for (auto entry = rows[i].lower_bound(dofs); entry != rows[i].end(); ++entry)
-        check(MatSetValue(result, pairs[static_cast<std::size_t>(entry->first - dofs)], pivots[i], entry->second.*kind,
-                          INSERT_VALUES));
+        if (const auto [pair, component] = held[static_cast<std::size_t>(entry->first - dofs)]; component == 0)
+          check(MatSetValue(result, pair, pivots[i], entry->second.*kind, INSERT_VALUES));
   check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
   return result;
@@ -233,20 +287,28 @@ ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface
                                      const std::vector<char>& closed)
 {
   ClosedContact result;
-  for (int pair = 0; pair < interface.pairs; ++pair)
-    if (closed[static_cast<std::size_t>(pair)] && compliance_of(interface, static_cast<std::size_t>(pair)) == 0)
-      result.pairs.push_back(pair);
-  std::vector<Row> rows = read_rows(interface, result.pairs);
+  const std::vector<HeldRow> held = held_rows(interface, closed);
+  for (const auto& [pair, component] : held)
+    if (component == 0) result.pairs.push_back(pair);
+  std::ranges::sort(result.pairs);
+  std::vector<Row> rows = read_rows(interface, held);
   PetscInt dofs = 0;
   check(MatGetSize(structure.K, &dofs, nullptr));
-  const std::vector<PetscInt> pivots = eliminate(rows, result.pairs, dofs);
-  Elimination elimination{rows, {}, pivots, dofs};
-  for (std::size_t i = 0; i < pivots.size(); ++i) elimination.row_of[pivots[i]] = i;
+  const std::vector<PetscInt> pivots = eliminate(rows, held, interface, dofs);
+  Elimination elimination{rows, {}, {}, dofs};
+  for (std::size_t i = 0; i < pivots.size(); ++i)
+    if (pivots[i] >= 0)
+    {
+      elimination.row_of[pivots[i]] = i;
+      elimination.pivots.push_back(pivots[i]);
+    }
+    else
+      ++result.dependent_rows;
   std::sort(elimination.pivots.begin(), elimination.pivots.end());
   result.Z = assemble_basis(elimination, &Coefficients::normal, structure.K);
   result.Y = assemble_basis(elimination, &Coefficients::sliding, structure.K);
-  result.reaction = assemble_reaction(rows, &Coefficients::sliding, pivots, result.pairs, interface);
-  result.normal_reaction = assemble_reaction(rows, &Coefficients::normal, pivots, result.pairs, interface);
+  result.reaction = assemble_reaction(rows, &Coefficients::sliding, pivots, held, interface);
+  result.normal_reaction = assemble_reaction(rows, &Coefficients::normal, pivots, held, interface);
   result.pivots = elimination.pivots;
   return result;
 }
@@ -294,7 +356,7 @@ Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>&
   {
     const double reaction = PairView(reactions, interface.directions).normal(i);
     if (!closed[i] || reaction <= 0) continue;
-    const SlidingFriction friction = sliding_friction(interface.friction, reaction, drive.of(i)); // even in s
+    const SlidingFriction friction = sliding_friction(interface.friction.of(i), reaction, drive.of(i)); // even in s
     const auto& damping = part == FrictionDamping::whole ? friction.damping : friction.damping_of_speed;
     const PetscInt tangential = rows.tangential(static_cast<PetscInt>(i));
     for (PetscInt k = 0; k < rows.directions; ++k)
@@ -343,7 +405,7 @@ Owned<Mat> sum_of(Mat A, Mat B)
 Owned<Mat> sliding_damping(const SlidingEquilibrium& sliding)
 {
   const auto& [structure, interface, equilibrium] = sliding;
-  const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
+  const auto part = interface.friction.common.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
   Owned<Mat> result = copy_of(structure.C);
   if (const Owned<Mat> Cf = friction_damping(interface, equilibrium.closed, equilibrium.reactions, part); Cf.get())
     check(MatAXPY(result, 1, Cf, UNKNOWN_NONZERO_PATTERN));

@@ -29,7 +29,7 @@ struct Iterate
   VectorXd& w;      // W r + b
   double speed = 0; // [m/s] the largest of b
   int directions = map.model.directions;
-  FrictionLaw friction = law_of_step(map.model.friction, map.theta);
+  PairFriction friction = law_of_step(map.model.friction, map.theta);
   PairRows<Index> rows{directions};
 
   std::size_t pairs() const { return map.own.size(); }
@@ -40,7 +40,7 @@ struct Iterate
   double defect(std::size_t pair, double largest) const
   {
     const NaturalScale rho = natural_scale(map.own[pair], 0);
-    const double error = natural_map(reaction(pair), velocity(pair), friction, rho);
+    const double error = natural_map(reaction(pair), velocity(pair), friction.of(pair), rho);
     return error > 0 ? error / force_scale(rho, speed, largest) : 0;
   }
 };
@@ -59,7 +59,8 @@ void change_reaction(Iterate& iterate, std::size_t pair, const PairVector& next)
 void admit(Iterate& iterate)
 {
   for (std::size_t pair = 0; pair < iterate.pairs(); ++pair)
-    change_reaction(iterate, pair, admissible(iterate.reaction(pair), iterate.velocity(pair), iterate.friction));
+    change_reaction(iterate, pair,
+                    admissible(iterate.reaction(pair), iterate.velocity(pair), iterate.friction.of(pair)));
 }
 
 /// What a unit of each pair's normal reaction goes with: itself and, unless the pair sticks, friction against
@@ -76,7 +77,7 @@ std::vector<PairVector> unit_reactions(const Iterate& iterate)
     const PairVector w = iterate.velocity(pair);
     const double speed = length(w[1], w[2]);
     if (speed == 0 || status[pair] == ContactStatus::stick) continue;
-    const double mu = friction_coefficient(iterate.friction, speed).value;
+    const double mu = friction_coefficient(iterate.friction.of(pair), speed).value;
     unit[1] = -mu * w[1] / speed;
     unit[2] = -mu * w[2] / speed;
   }
@@ -137,7 +138,7 @@ void sweep_pairs(Iterate& iterate, double limit)
     if (iterate.defect(pair, largest) <= limit) continue;
     const PairBlock& A = iterate.map.own[pair];
     const PairVector last = iterate.reaction(pair), q = velocity_without(A, last, iterate.velocity(pair));
-    change_reaction(iterate, pair, solve_pair(A, q, iterate.directions, iterate.friction, last));
+    change_reaction(iterate, pair, solve_pair(A, q, iterate.directions, iterate.friction.of(pair), last));
   }
 }
 

@@ -188,7 +188,7 @@ void set_active_pairs(ReducedModel& model, const Interface& interface, const Equ
   const PairView still(motion, interface.directions), reactions(equilibrium.reactions, interface.directions);
   const TangentView drive(interface.drive, interface.directions);
   model.directions = sliding ? 0 : interface.directions;
-  if (!sliding) model.friction = interface.friction;
+  if (!sliding) model.friction = friction_of_some(interface.friction, model.active);
   for (const int pair : model.active)
   {
     const auto i = static_cast<std::size_t>(pair);

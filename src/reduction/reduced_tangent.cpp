@@ -99,13 +99,13 @@ void linearise_contact(const ReducedMap& map, const RecordedContact& contact, co
   const PairRows<Index> rows(model.directions);
   const PairView<const double> r(contact.r, model.directions), w(contact.w, model.directions);
   const std::vector<ContactStatus> status = contact_status(r, w, model.friction);
-  const FrictionLaw law = law_of_step(model.friction, map.theta);
+  const PairFriction laws = law_of_step(model.friction, map.theta);
   MatrixXd A = map.W(step.rows, step.rows);
   for (std::size_t i = 0; i < closed.size(); ++i)
   {
     const std::span<const double> s = w.tangential(closed[i]);
     if (status[closed[i]] == ContactStatus::stick || length(s) == 0) continue;
-    const SlidingFriction friction = sliding_friction(law, r.normal(closed[i]), s);
+    const SlidingFriction friction = sliding_friction(laws.of(closed[i]), r.normal(closed[i]), s);
     const Index normal = rows.normal(static_cast<Index>(i)), tangential = rows.tangential(static_cast<Index>(i));
     MatrixXd damping(d, d);
     for (Index k = 0; k < d; ++k)

@@ -191,6 +191,9 @@ void add_transient(Entry out, const Report& report)
   out.show("frequency_bias", "-", "relative error of the frequency by theta and the step", bias.frequency);
   add_chatter(out, run.history);
   out.show("energy_defect_max", "-", "largest defect of the energy identity over the energy", run.energy_defect_max);
+  if (out.has(!run.history.joint_work.empty()))
+    out.add("joint_work", "J", "work of the pairs without a drive of each contact, below zero: what they take",
+            run.history.joint_work);
   out.show("residual", "-", "largest natural map of a pair over the largest reaction", run.outcome.residual);
   out.add("contact_iterations_mean", "-", "mean number of contact iterations a step", run.contact_iterations_mean);
   out.add("contact_steps_as_one", "-", "steps in which all pairs had to be swept as one patch",

@@ -29,6 +29,19 @@ void add_contact(Entry out, const Contact& contact, const ContactResultant& resu
     out.show("torque", "N m", "torque with which it brakes its rotation", resultant.torque);
 }
 
+void add_history(Entry out, const LoadHistory& history)
+{
+  out.show("stick", "-", "pairs without a drive that stick in the last increment", history.stick);
+  out.show("slip", "-", "those that slip in it", history.slip);
+  out.show("open", "-", "those that are open", history.open);
+  out.show("at_limit", "-", "those that stick within 1 % of their friction", history.at_limit);
+  out.show("increments", "-", "increments of the load path", history.increments);
+  out.show("change", "-", "change of reactions over the largest of their contact, from half as many", history.change);
+  out.add("index", "-", "sign of the determinant of the status system; -1: no rate of loading follows", history.index);
+  out.add("reciprocal_condition", "-", "smallest over largest pivot of the status system",
+          history.reciprocal_condition);
+}
+
 void add_mode(Entry out, const ComplexMode& mode)
 {
   out.show("frequency_hz", "Hz", "frequency of a mode; the largest growth rate comes first", mode.frequency_hz());
@@ -106,6 +119,8 @@ void add_equilibrium(Entry whole, const Report& report)
       .show("auxiliary_stiffness", "N/m", "springs across pairs that alone hold a body; 0: none",
             found.auxiliary_stiffness);
   out.add("uniqueness", "whether other equilibria are excluded", found.uniqueness);
+  if (out.has(found.history.has_value()))
+    add_history(out.group("undriven_pairs"), found.history.value_or(LoadHistory{}));
   out.list("contacts", add_contact, out.scene().contacts, report.contacts);
   add_probes(out, "probes", "displacement of the probe at equilibrium", report.equilibrium_probes);
   if (found.uniqueness == Uniqueness::not_assured)

@@ -31,8 +31,9 @@ std::optional<std::size_t> place_in(std::size_t size, const std::string& word)
 double* number_of(const Target& target)
 {
   if (double* const* number = std::get_if<double*>(&target)) return *number;
-  const auto* damping = std::get_if<DampingTarget>(&target);
-  return damping ? &((**damping->damping).*damping->member) : nullptr;
+  if (const auto* damping = std::get_if<DampingTarget>(&target)) return &((**damping->part).*damping->member);
+  const auto* friction = std::get_if<FrictionTarget>(&target);
+  return friction ? &((**friction->part).*friction->member) : nullptr;
 }
 
 /// The numbers that a member lists. In a list of vectors the first of the words selects one, and is taken out of them.

@@ -38,11 +38,16 @@ public:
     }
     for (const Contact& contact : scene_.contacts) check_contact(contact);
     check_contacts_differ();
+    check_steps();
+    for (const InitialMotion& initial : scene_.initial) check_initial(initial);
     for (const Tie& tie : scene_.ties)
       if (tie.slave == tie.master)
         fail(&tie.master, "[[tie]] slave and master are both \"" + tie.slave + "\"; name two surfaces");
     for (const Probe& probe : scene_.probes) check_probe(probe);
-    check_friction();
+    check_law(scene_.friction,
+              scene_.friction.decay_speed > 0 ? static_cast<const void*>(&scene_.friction.decay_speed)
+                                              : &scene_.friction.static_coefficient,
+              "[friction]");
     check_damping();
     check_loss();
     check_transient();
@@ -218,9 +223,7 @@ private:
       fail(&contact.rotor, "[[contact]] between points needs the key 'normal', out of the rotor into the stator");
     if (contact.rotation && contact.velocity != Vec3{})
       fail(&contact.velocity, "[[contact]] rotation and velocity exclude each other: keep one");
-    if (!contact.rotation && contact.velocity == Vec3{} &&
-        std::max(scene_.friction.coefficient, scene_.friction.static_coefficient) > 0)
-      fail(&contact.rotor, "[[contact]] needs a rotation or a velocity that drives the rotor where there is friction");
+    if (contact.friction) check_law(*contact.friction, &contact.friction, "[[contact]]");
     check_frame(contact);
   }
 
@@ -234,12 +237,47 @@ private:
                                  "\" are in contact already; remove one of the two tables");
   }
 
-  void check_friction() const
+  /// The last step ends at the scene's own loads and friction, which modes and motions belong to.
+  void check_steps() const
   {
-    const FrictionLaw& f = scene_.friction;
+    const auto need_factors = [&](const std::vector<double>& factors, std::size_t count, const char* key)
+    {
+      if (!factors.empty() && factors.size() != count)
+        fail(&factors, std::string("[[step]] ") + key + " holds " + std::to_string(factors.size()) +
+                           " factors for the scene's " + std::to_string(count) + ": give one each");
+    };
+    for (const LoadStep& step : scene_.steps)
+    {
+      need_factors(step.forces, scene_.forces.size(), "forces");
+      need_factors(step.pressures, scene_.pressures.size(), "pressures");
+    }
+    if (scene_.steps.empty()) return;
+    const LoadStep& last = scene_.steps.back();
+    const auto is_one = [](double factor) { return factor == 1; };
+    if (last.load != 1 || last.friction != 1 || !std::ranges::all_of(last.forces, is_one) ||
+        !std::ranges::all_of(last.pressures, is_one))
+      fail(&last, "[[step]] " + last.name +
+                      " is the last one: its factors must be 1, since modes and motions belong to the scene's own "
+                      "loads and friction; change these instead");
+  }
+
+  void check_initial(const InitialMotion& initial) const
+  {
+    if (initial.displacement == Vec3{} && initial.velocity == Vec3{})
+      fail(&initial, "[[initial]] on " + initial.on + " moves nothing: give displacement or velocity");
+    if (!scene_.transient.enabled)
+      fail(&initial, "[[initial]] is where the [transient] starts: give that table, or take this one out");
+    if (scene_.matrices)
+      fail(&initial,
+           "[[initial]] is for mesh and point scenes: a matrix scene starts from a state file, [transient] start");
+    if (!scene_.mesh) need_known(initial.on, points_, &initial.on, "[[initial]] on");
+  }
+
+  void check_law(const FrictionLaw& f, const void* member, const char* table) const
+  {
     if ((f.static_coefficient > 0) != (f.decay_speed > 0))
-      fail(f.decay_speed > 0 ? static_cast<const void*>(&f.decay_speed) : &f.static_coefficient,
-           "[friction] static_coefficient and decay_speed go together: give both, or coefficient alone");
+      fail(member, std::string(table) + " static_coefficient and decay_speed go together: give both, or " +
+                       (table == std::string("[friction]") ? "coefficient" : "friction") + " alone");
   }
 
   /// Rayleigh damping is of parts and of given matrices: masses of points and bodies and springs carry none.

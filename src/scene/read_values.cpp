@@ -188,10 +188,10 @@ public:
     }
   }
 
-  void read(const toml::node& node, const DampingTarget& target) const
+  template <class Part> void read(const toml::node& node, const MemberTarget<Part>& target) const
   {
-    if (!*target.damping) target.damping->emplace();
-    (**target.damping).*target.member = number(node);
+    if (!*target.part) target.part->emplace();
+    (**target.part).*target.member = number(node);
   }
 
 private:

@@ -140,6 +140,14 @@ bool are_given(const Ramps& ramps)
   return !ramps.load.time.empty() || !ramps.speed.time.empty() || !ramps.friction.time.empty();
 }
 
+void resolve_friction(Scene& scene)
+{
+  const FrictionLaw& law = scene.friction;
+  if (std::max(law.coefficient, law.static_coefficient) == 0) return;
+  for (Contact& contact : scene.contacts)
+    if (is_undriven(contact) && !contact.friction) contact.friction = law;
+}
+
 std::string Places::at(const void* member) const
 {
   const auto found = given.find(member);
@@ -155,6 +163,7 @@ Scene read_scene(const std::filesystem::path& file, const std::vector<std::strin
   Places places{file.string(), {}};
   read_tables(root, scene, places);
   check_scene(scene, places);
+  resolve_friction(scene);
   fit_damping(scene, places);
   resolve_branch(scene, places);
   resolve_sweep(scene, places);

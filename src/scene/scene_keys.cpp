@@ -221,7 +221,37 @@ SceneKeys keys_of(Contact& c)
       {"tangents", &c.tangents, "-", "one direction: plane friction along it; or two; when absent, two are chosen",
        direction, drive},
       {"rotation", braces(c.rotation), "table", "rotation of the rotor: {axis, centre, rate}", drive},
-      {"velocity", &c.velocity, "m/s", "velocity of the rotor's surface, instead of a rotation", velocity, drive},
+      {"velocity", &c.velocity, "m/s",
+       "velocity of the rotor's surface, instead of a rotation; without either the contact sticks or slips by itself",
+       velocity, drive},
+      {"friction", FrictionTarget{&c.friction, &FrictionLaw::coefficient}, "-",
+       "the contact's own Coulomb's mu; 0 is a smooth stop; [friction] when absent", not_negative, friction},
+      {"static_coefficient", FrictionTarget{&c.friction, &FrictionLaw::static_coefficient}, "-",
+       "its own mu at rest, with a decay_speed", not_negative, friction},
+      {"decay_speed", FrictionTarget{&c.friction, &FrictionLaw::decay_speed}, "m/s", "of its own law, as of [friction]",
+       not_negative, friction},
+  };
+}
+
+SceneKeys keys_of(LoadStep& s)
+{
+  return {
+      {"name", &s.name, "text", "name in messages and results", required},
+      {"load", &s.load, "-", "factor at the step's end on all forces and pressures; 1 in the last step"},
+      {"forces", &s.forces, "-", "factors beside it, one a [[force]]; 1 when absent, and in the last step"},
+      {"pressures", &s.pressures, "-", "factors beside it, one a [[pressure]]; 1 when absent, and in the last step"},
+      {"friction", &s.friction, "-",
+       "factor at the step's end on the friction of driven contacts: 0 while the rotor is at rest; 1 in the last step",
+       not_negative},
+  };
+}
+
+SceneKeys keys_of(InitialMotion& m)
+{
+  return {
+      {"on", &m.on, "text", "point, rigid body or named group", required},
+      {"displacement", &m.displacement, "m", "displacement of all its nodes, beside that of [transient] start"},
+      {"velocity", &m.velocity, "m/s", "velocity of all its nodes, likewise"},
   };
 }
 
@@ -302,8 +332,10 @@ SceneKeys keys_of(Scene& scene)
       section("force", scene.forces, "force on a point, a rigid body or a named group"),
       section("pressure", scene.pressures, "pressure on a named surface"),
       section("contact", scene.contacts, "two named surfaces or two points in contact with friction"),
+      section("step", scene.steps, "a step on the way to the loads; undriven contacts depend on their order"),
+      section("initial", scene.initial, "a displacement or velocity that the transient starts with"),
       section("tie", scene.ties, "two named surfaces of parts meshed apart that move as one"),
-      section("friction", scene.friction, "Coulomb's law at every contact"),
+      section("friction", scene.friction, "Coulomb's law of contacts that have none of their own"),
       section("damping", scene.damping, "Rayleigh damping C = alpha M + beta K of parts that give none of their own"),
       section("modes", scene.modes, "stability of the sliding equilibrium"),
       section("estimate", scene.estimate, "energy estimate of the cycle's amplitude"),
@@ -352,7 +384,7 @@ bool is_absent(const SceneKey& key)
   {
     using Kind = std::remove_cvref_t<decltype(target)>;
     if constexpr (std::is_pointer_v<Kind>) return of_value(*target);
-    if constexpr (std::is_same_v<Kind, DampingTarget>) return !target.damping->has_value();
+    if constexpr (requires { target.part; }) return !target.part->has_value();
     if constexpr (std::is_same_v<Kind, TableTarget>) return target.size() == 0;
     return false;
   };

@@ -10,12 +10,15 @@
 namespace squeal
 {
 
-/// alpha or beta of an optional damping. Setting either of them creates the damping.
-struct DampingTarget
+/// A number of an optional part. Setting one of its numbers creates the part.
+template <class Part> struct MemberTarget
 {
-  std::optional<RayleighDamping>* damping;
-  double RayleighDamping::*member;
+  std::optional<Part>* part;
+  double Part::*member;
 };
+
+using DampingTarget = MemberTarget<RayleighDamping>;
+using FrictionTarget = MemberTarget<FrictionLaw>;
 
 /// The start of a motion: one of the words, or a state file, which the last word stands for.
 struct StartTarget
@@ -44,10 +47,11 @@ struct TableTarget
 };
 
 /// The member that a key fills.
-using Target = std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*,
-                            std::optional<Vec3>*, std::vector<Vec3>*, std::vector<std::string>*, std::vector<double>*,
-                            std::vector<int>*, std::array<double, 6>*, Motions*, std::map<std::string, double>*,
-                            TimeFactor*, DampingTarget, StartTarget, std::vector<MeasuredRatio>*, Choice, TableTarget>;
+using Target =
+    std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*, std::optional<Vec3>*,
+                 std::vector<Vec3>*, std::vector<std::string>*, std::vector<double>*, std::vector<int>*,
+                 std::array<double, 6>*, Motions*, std::map<std::string, double>*, TimeFactor*, DampingTarget,
+                 FrictionTarget, StartTarget, std::vector<MeasuredRatio>*, Choice, TableTarget>;
 
 /// Whether a key must be given.
 enum class Need
@@ -147,6 +151,9 @@ struct Places
 
 /// Throws Error on contradictions between keys: undefined or repeated names, tables that exclude each other.
 void check_scene(const Scene& scene, const Places& places);
+
+/// Gives undriven contacts without a friction of their own that of the scene, which sweeps then change elsewhere alone.
+void resolve_friction(Scene& scene);
 
 /// Finds the scene's own value of the number that a branch follows. Throws Error if there is none, or no branch from
 /// it.

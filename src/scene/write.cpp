@@ -85,9 +85,9 @@ std::string print(const std::map<std::string, double>& table)
   return "{" + text + " }";
 }
 
-std::string print(const DampingTarget& target)
+template <class Part> std::string print(const MemberTarget<Part>& target)
 {
-  return print((**target.damping).*target.member);
+  return print((**target.part).*target.member);
 }
 
 std::string print(const Choice& target)

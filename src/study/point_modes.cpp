@@ -46,7 +46,7 @@ LinearisedPoint linearise_point(const SlidingEquilibrium& sliding)
 {
   const auto& [structure, interface, equilibrium] = sliding;
   LinearisedPoint point{eliminate_closed_pairs(structure, interface, equilibrium.closed)};
-  const auto part = interface.friction.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
+  const auto part = interface.friction.common.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
   point.damping = damping_of_pairs(interface, equilibrium.closed, equilibrium.reactions, part);
   point.stiffness = stiffness_of_pairs(interface, equilibrium.closed, PairForces::with_friction);
   return point;

@@ -40,7 +40,7 @@ std::vector<PairDamping> pair_dampings(const SlidingEquilibrium& sliding, const 
   for (std::size_t i = 0; i < result.size(); ++i)
   {
     if (!equilibrium.closed[i] || reactions.normal(i) <= 0) continue;
-    const SlidingFriction friction = sliding_friction(interface.friction, reactions.normal(i), drive.of(i));
+    const SlidingFriction friction = sliding_friction(interface.friction.of(i), reactions.normal(i), drive.of(i));
     const auto product_with = [&](const auto& damping)
     {
       double sum = 0;
@@ -50,7 +50,7 @@ std::vector<PairDamping> pair_dampings(const SlidingEquilibrium& sliding, const 
       return sum;
     };
     result[i].of_speed = product_with(friction.damping_of_speed);
-    if (interface.friction.direction_damping)
+    if (interface.friction.common.direction_damping)
       result[i].of_direction = product_with(friction.damping) - result[i].of_speed;
   }
   return result;

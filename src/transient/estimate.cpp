@@ -166,14 +166,15 @@ std::vector<PairMotion> pair_motions(const SlidingEquilibrium& sliding, const Li
     if (!equilibrium.closed[i]) continue;
     PairMotion pair;
     pair.directions = static_cast<std::size_t>(directions);
-    pair.law = interface.friction;
+    pair.law = interface.friction.of(i);
     pair.reaction0 = PairView(equilibrium.reactions, directions).normal(i);
     pair.reaction = reactions[i];
     pair.mode_reaction = mode.reactions[i];
     for (std::size_t k = 0; k < pair.directions; ++k)
     {
-      pair.velocity[k] =
-          s * Complex(PairView(real, directions).tangential(i)[k], PairView(imaginary, directions).tangential(i)[k]);
+      if (!is_undriven(interface, i)) // it sticks in the mode, and takes no power
+        pair.velocity[k] =
+            s * Complex(PairView(real, directions).tangential(i)[k], PairView(imaginary, directions).tangential(i)[k]);
       pair.drive[k] = TangentView(interface.drive, directions).of(i)[k];
       pair.along[k] = TangentView(e, directions).of(i)[k];
     }

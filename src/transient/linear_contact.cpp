@@ -23,7 +23,7 @@ struct Slip // of a pair
   Index first = 0, normal = 0; // its first tangential row of W, and its normal one's place among the first unknowns
   PairMatrix turn;             // [-] columns: e, and the direction across it
   double mu = 0;               // [-]
-  double by_coefficient = 0;   // [N] r_n dmu/d(coefficient)
+  double by_coefficient = 0;   // [N] r_n dmu/d(common coefficient)
 };
 
 /// The closed pairs.
@@ -37,13 +37,13 @@ struct Unknowns
   Index size() const { return static_cast<Index>(leading.size()) + S.size(); }
 };
 
-Unknowns unknowns_of(int directions, const FrictionLaw& law, const StepRecord& record,
+Unknowns unknowns_of(int directions, const PairFriction& friction, const StepRecord& record,
                      std::span<const ContactStatus> statuses)
 {
   const PairRows<Index> rows(directions);
   const PairView reactions(record.reactions, directions), velocity(record.contact_velocity, directions);
   Unknowns result;
-  result.first_turned = law.decay_speed == 0 ? 1 : 0; // constant mu: dw_t along e does not matter
+  result.first_turned = depends_on_speed(friction) ? 0 : 1; // constant mu: dw_t along e does not matter
   std::vector<double> S;
   for (std::size_t pair = 0; pair < statuses.size(); ++pair)
   {
@@ -57,12 +57,14 @@ Unknowns unknowns_of(int directions, const FrictionLaw& law, const StepRecord& r
     }
     const VectorXd w = VectorXd::Map(velocity.tangential(pair).data(), directions);
     const double speed = std::max(w.norm(), 1e-300), reaction = reactions.normal(pair);
+    const FrictionLaw& law = friction.of(pair);
     const FrictionCoefficient mu = friction_coefficient(law, speed);
+    const double by_common = friction.has_own(pair) ? 0 : share_of_coefficient(law, speed);
     const VectorXd e = w / speed;
     PairMatrix turn = e;
     if (directions == 2) turn = (PairMatrix(2, 2) << e(0), -e(1), e(1), e(0)).finished();
-    result.slips.push_back({rows.tangential(own), static_cast<Index>(result.leading.size()) - 1, turn, mu.value,
-                            reaction * share_of_coefficient(law, speed)});
+    result.slips.push_back(
+        {rows.tangential(own), static_cast<Index>(result.leading.size()) - 1, turn, mu.value, reaction * by_common});
     if (result.first_turned == 0) S.push_back(mu.derivative * reaction);
     if (directions == 2) S.push_back(mu.value * reaction / speed);
   }
@@ -168,22 +170,22 @@ MatrixXd by_whole_system(MatrixXd A, const VectorXd& S, const MatrixXd& b)
 
 } // namespace
 
-MatrixXd linear_contact_response(std::span<const double> W, int directions, const FrictionLaw& law,
+MatrixXd linear_contact_response(std::span<const double> W, int directions, const PairFriction& friction,
                                  const StepRecord& record, std::span<const ContactStatus> statuses, const MatrixXd& db,
                                  const VectorXd& dmu)
 {
   MatrixXd result = MatrixXd::Zero(db.rows(), db.cols());
-  const Unknowns unknowns = unknowns_of(directions, law, record, statuses);
+  const Unknowns unknowns = unknowns_of(directions, friction, record, statuses);
   if (unknowns.leading.empty()) return result;
   const Eigen::Map<const MatrixXd> whole(W.data(), db.rows(), db.rows());
   const auto leading = static_cast<Index>(unknowns.leading.size());
   MatrixXd A = condense(unknowns, whole), b = rows_of(unknowns, db);
   if (!dmu.isZero(0))
   {
-    VectorXd friction = VectorXd::Zero(db.rows());
+    VectorXd by_coefficient = VectorXd::Zero(db.rows());
     for (const Slip& slip : unknowns.slips)
-      friction.segment(slip.first, slip.turn.rows()) = slip.by_coefficient * slip.turn.col(0);
-    b -= rows_of(unknowns, whole * friction) * dmu.transpose();
+      by_coefficient.segment(slip.first, slip.turn.rows()) = slip.by_coefficient * slip.turn.col(0);
+    b -= rows_of(unknowns, whole * by_coefficient) * dmu.transpose();
   }
   regularise(A, leading);
   std::optional<MatrixXd> x = by_fixed_point(A, unknowns.S, b);

@@ -21,7 +21,7 @@ namespace squeal
 
 /// dr of each column of db, with the change of the law's coefficient of each; every row of W, zeros on open pairs.
 /// `W`: all its entries. On rank 0, where W is.
-Eigen::MatrixXd linear_contact_response(std::span<const double> W, int directions, const FrictionLaw& law,
+Eigen::MatrixXd linear_contact_response(std::span<const double> W, int directions, const PairFriction& friction,
                                         const StepRecord& record, std::span<const ContactStatus> statuses,
                                         const Eigen::MatrixXd& db, const Eigen::VectorXd& dmu);
 

@@ -45,6 +45,36 @@ std::vector<double> free_contact_velocity(const StepBatch& batch, const StartOfS
   return b;
 }
 
+/// Holds undriven pairs that stuck in the step before where they began to: sets the anchors of those that are new, and
+/// drops the others. `position`: B ut.
+void hold_anchors(const Interface& interface, const std::vector<double>& position,
+                  const std::vector<ContactStatus>& before, StickAnchors& anchors)
+{
+  if (!has_undriven_pairs(interface)) return;
+  anchors.at.resize(position.size());
+  anchors.is_held.resize(before.size(), 0);
+  const PairView<double> at(anchors.at, interface.directions);
+  for (std::size_t i = 0; i < before.size(); ++i)
+  {
+    const bool sticks = is_undriven(interface, i) && before[i] == ContactStatus::stick;
+    if (sticks && !anchors.is_held[i]) at.set(i, PairView(position, interface.directions).vector(i));
+    anchors.is_held[i] = sticks;
+  }
+}
+
+/// Adds (B_t ut - a)/h to the tangential rows of pairs that are held at a. On rank 0; elsewhere b is empty.
+void lead_back(const StepBatch& batch, const std::vector<double>& position, const StickAnchors& anchors,
+               std::vector<double>& b)
+{
+  const int directions = batch.interface.directions;
+  const PairView<double> velocity(b, directions);
+  for (std::size_t i = 0; i < std::min(velocity.pairs(), anchors.is_held.size()); ++i)
+    for (std::size_t k = 0; anchors.is_held[i] && k < velocity.tangential(i).size(); ++k)
+      velocity.tangential(i)[k] +=
+          (PairView(position, directions).tangential(i)[k] - PairView(anchors.at, directions).tangential(i)[k]) /
+          batch.step.h;
+}
+
 /// One trajectory's problem: w = W r + free + past.
 struct StepProblem
 {
@@ -57,7 +87,7 @@ std::vector<StepProblem> make_problems(const StepBatch& batch, const std::vector
   const auto& [step, interface, factors, works, states, reports] = batch;
   const double weight = (1 - step.theta) / step.theta;
   const auto size = static_cast<std::ptrdiff_t>(Bv_free.size() / states.size());
-  const FrictionLaw law_before = scaled(interface.friction, factors.friction_before);
+  const PairFriction law_before = scaled(interface, factors.friction_before);
   std::vector<double> drive = interface.drive;
   for (double& velocity : drive) velocity *= factors.drive_start;
   std::vector<Vec> start;
@@ -73,9 +103,12 @@ std::vector<StepProblem> make_problems(const StepBatch& batch, const std::vector
     const std::vector<double>&position = motion[2 * k], &velocity = motion[2 * k + 1];
     const auto first = Bv_free.begin() + static_cast<std::ptrdiff_t>(k) * size;
     problems[k].free = free_contact_velocity(batch, {position, velocity}, {first, first + size});
-    problems[k].past =
-        past_sliding(PairView(velocity, interface.directions), TangentView<const double>(drive, interface.directions),
-                     status_with(interface, law_before, factors.drive_start, states[k].reactions, velocity), weight);
+    const std::vector<ContactStatus> before =
+        status_with(interface, law_before, factors.drive_start, states[k].reactions, velocity);
+    hold_anchors(interface, position, before, works[k].anchors);
+    lead_back(batch, position, works[k].anchors, problems[k].free);
+    problems[k].past = past_sliding(PairView(velocity, interface.directions),
+                                    TangentView<const double>(drive, interface.directions), before, weight);
   }
   return problems;
 }
@@ -88,12 +121,12 @@ std::vector<double> sum(const std::vector<double>& a, const std::vector<double>&
 }
 
 /// The largest |mu'| r_n W_t of a pair, with the steepest fall of mu and the pair's own tangential compliance.
-double fall_at_pairs(const ContactOperator& W, const FrictionLaw& law, const std::vector<double>& reactions)
+double fall_at_pairs(const ContactOperator& W, const PairFriction& friction, const std::vector<double>& reactions)
 {
-  const double fall = steepest_fall(law);
   double largest = 0;
-  for (std::size_t i = 0; fall > 0 && i < W.pairs(); ++i)
-    largest = std::max(largest, fall * PairView(reactions, W.directions()).normal(i) / W.scale(i).tangential);
+  for (std::size_t i = 0; depends_on_speed(friction) && i < W.pairs(); ++i)
+    largest = std::max(largest, steepest_fall(friction.of(i)) * PairView(reactions, W.directions()).normal(i) /
+                                    W.scale(i).tangential);
   return largest;
 }
 
@@ -107,7 +140,7 @@ std::vector<std::size_t> solve_once(const StepBatch& batch, std::vector<StepProb
   std::vector<ContactProblem> unsolved;
   for (std::size_t j = 0; j < trajectories.size(); ++j)
     unsolved.push_back({b[j], states[trajectories[j]].reactions, works[trajectories[j]].memory});
-  const FrictionLaw law = law_of_step(scaled(interface.friction, factors.friction), step.theta);
+  const PairFriction law = law_of_step(scaled(interface, factors.friction), step.theta);
   const std::vector<ContactResult> results = solve_contacts(step.W, law, step.contact, unsolved);
   std::vector<std::size_t> again;
   for (std::size_t j = 0; j < trajectories.size(); ++j)
@@ -201,24 +234,38 @@ std::string solve_all(const StepBatch& batch, std::vector<StepProblem>& problems
 
 } // namespace
 
-FrictionLaw scaled(FrictionLaw law, double factor)
+PairFriction scaled(const Interface& interface, double factor)
 {
-  law.coefficient *= factor;
-  law.static_coefficient *= factor;
-  return law;
+  const PairFriction& whole = interface.friction;
+  if (factor == 1) return whole;
+  PairFriction result = changed(whole,
+                                [factor](FrictionLaw& law)
+                                {
+                                  law.coefficient *= factor;
+                                  law.static_coefficient *= factor;
+                                });
+  if (!has_undriven_pairs(interface)) return result;
+  result.own.insert(result.own.end(), whole.own.begin(), whole.own.end());
+  result.own.push_back(whole.common);
+  const int laws = static_cast<int>(whole.own.size());
+  result.number_of_own.resize(interface.gap.size(), -1);
+  for (std::size_t i = 0; i < interface.gap.size(); ++i)
+    if (is_undriven(interface, i))
+      result.number_of_own[i] = whole.has_own(i) ? laws + whole.number_of_own[i] : 2 * laws;
+  return result;
 }
 
-std::vector<ContactStatus> status_with(const Interface& interface, const FrictionLaw& law, double drive,
+std::vector<ContactStatus> status_with(const Interface& interface, const PairFriction& friction, double drive,
                                        const std::vector<double>& reactions, std::vector<double> velocity)
 {
-  if (law.decay_speed > 0)
+  if (depends_on_speed(friction))
   {
     const PairView<double> w(velocity, interface.directions);
     const TangentView v_d(interface.drive, interface.directions);
     for (std::size_t i = 0; i < w.pairs(); ++i)
       for (std::size_t k = 0; k < v_d.of(i).size(); ++k) w.tangential(i)[k] -= drive * v_d.of(i)[k];
   }
-  return contact_status(PairView(reactions, interface.directions), PairView(velocity, interface.directions), law);
+  return contact_status(PairView(reactions, interface.directions), PairView(velocity, interface.directions), friction);
 }
 
 void find_reactions(const StepBatch& batch, const std::vector<double>& Bv_free)

@@ -16,12 +16,13 @@ struct StepBatch
   std::span<StepReport> reports;
 };
 
-/// The law with its coefficients times a factor.
-FrictionLaw scaled(FrictionLaw law, double factor);
+/// The laws with the coefficients of driven pairs times a factor. Joints keep theirs, which hold the structure
+/// together.
+PairFriction scaled(const Interface& interface, double factor);
 
 /// Statuses of a step's end, from its reactions, its law, its factor on the drive and `velocity`, B v, which a law
 /// without a decay speed does not look at.
-std::vector<ContactStatus> status_with(const Interface& interface, const FrictionLaw& law, double drive,
+std::vector<ContactStatus> status_with(const Interface& interface, const PairFriction& friction, double drive,
                                        const std::vector<double>& reactions, std::vector<double> velocity);
 
 /// Reactions at the end of the step, into the states of every rank, and what the reports say of contact. `Bv_free`: B v

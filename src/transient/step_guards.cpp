@@ -57,15 +57,14 @@ struct FreeStep
   }
 };
 
-/// Times sqrt(r_n) of each pair on its tangential rows, and zero on normal ones.
-void scale_by_roots(const std::vector<double>& reactions, int directions, std::vector<double>& x)
+/// Times the root of each pair's weight on its tangential rows, and zero on normal ones.
+void scale_by_roots(const std::vector<double>& weights, int directions, std::vector<double>& x)
 {
   const PairView<double> scaled(x, directions);
-  const PairView r(reactions, directions);
   for (std::size_t i = 0; i < scaled.pairs(); ++i)
   {
     scaled.normal(i) = 0;
-    for (double& entry : scaled.tangential(i)) entry *= std::sqrt(std::max(0., r.normal(i)));
+    for (double& entry : scaled.tangential(i)) entry *= std::sqrt(weights[i]);
   }
 }
 
@@ -135,12 +134,16 @@ std::string step_refusal(const Structure& structure, const ComplexMode* mode, do
 
 double fall_of_friction(const ThetaStep& step, const Interface& interface, const std::vector<double>& reactions)
 {
-  const double fall = steepest_fall(law_of_step(interface.friction, step.theta));
-  if (fall == 0 || interface.pairs == 0) return 0;
+  const PairFriction friction = law_of_step(interface.friction, step.theta);
+  if (steepest_fall(friction) == 0 || interface.pairs == 0) return 0;
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < interface.gap.size(); ++i)
+    weights.push_back(steepest_fall(friction.of(i)) *
+                      std::max(0., PairView(reactions, interface.directions).normal(i)));
   double largest = 0;
   const auto iterate = [&]
   {
-    // power iteration on sqrt(r_n) W_tt sqrt(r_n)
+    // power iteration on W_tt between the roots of |mu'| r_n
     std::vector<double> x(interface.size(), 0.), y = x;
     const PairView<double> start(x, interface.directions);
     for (std::size_t i = 0; i < start.pairs(); ++i)
@@ -151,11 +154,11 @@ double fall_of_friction(const ThetaStep& step, const Interface& interface, const
       if (size == 0) break;
       for (double& entry : x) entry /= size;
       largest = size;
-      scale_by_roots(reactions, interface.directions, x);
+      scale_by_roots(weights, interface.directions, x);
       const std::span<const double> in = x;
       const std::span<double> out = y;
       step.W.multiply(std::span(&in, 1), std::span(&out, 1));
-      scale_by_roots(reactions, interface.directions, y);
+      scale_by_roots(weights, interface.directions, y);
       std::swap(x, y);
     }
   };
@@ -166,7 +169,7 @@ double fall_of_friction(const ThetaStep& step, const Interface& interface, const
                   if (rank_of(comm_of(interface.B)) == 0) iterate();
                 });
   MPI_Bcast(&largest, 1, MPI_DOUBLE, 0, comm_of(interface.B));
-  return fall * largest;
+  return largest;
 }
 
 std::string friction_refusal(const SlidingEquilibrium& sliding, const ComplexMode* mode, double theta, double h,

@@ -55,6 +55,26 @@ double drive_work(const StepBatch& batch, const State& state)
   return step.h * (step.theta * factors.drive_end + (1 - step.theta) * factors.drive_start) * sum;
 }
 
+/// h r.B v_theta over the undriven pairs of each contact: what friction takes, and shocks. Empty without such pairs.
+/// Collective.
+std::vector<double> joint_work(const StepBatch& batch, const State& state, Vec v_theta)
+{
+  std::vector<double> work;
+  const Interface& interface = batch.interface;
+  if (!has_undriven_pairs(interface)) return work;
+  const std::vector<double> velocity = relative(interface, v_theta);
+  for (std::size_t i = 0; i < interface.gap.size(); ++i)
+  {
+    if (!is_undriven(interface, i)) continue;
+    const std::size_t contact =
+        interface.geometry.empty() ? 0 : static_cast<std::size_t>(interface.geometry[i].contact);
+    work.resize(std::max(work.size(), contact + 1));
+    work[contact] += batch.step.h * dot(PairView(state.reactions, interface.directions).of(i),
+                                        PairView(velocity, interface.directions).of(i));
+  }
+  return work;
+}
+
 /// Works of each step from the products at both ends; all reductions in one message.
 void account(const StepBatch& batch, const Structure& structure)
 {
@@ -75,6 +95,7 @@ void account(const StepBatch& batch, const Structure& structure)
     report.contact_work = contact;
     report.load_work = step.h * step_factors.load * load;
     report.drive_work = drive_work(batch, states[k]);
+    report.joint_work = joint_work(batch, states[k], works[k].v_theta);
     report.energy_defect = report.energy - works[k].energy - (0.5 - step.theta) * (dMd + step.h * dKd) +
                            report.damping_work - contact - report.load_work;
   }
@@ -359,14 +380,14 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
   }
   multiply_mass_and_stiffness(step, structure, {next, u}, {Mv, Ku});
   account(batch, structure);
-  const FrictionLaw law = scaled(interface.friction, factors.friction);
+  const PairFriction friction = scaled(interface, factors.friction);
   for (std::size_t k = 0; k < states.size(); ++k)
   {
     StepWork& work = works[k];
     std::vector<double> velocity;
-    if (law.decay_speed > 0) velocity = relative(interface, work.v_next);
+    if (depends_on_speed(friction)) velocity = relative(interface, work.v_next);
     for (const ContactStatus status :
-         status_with(interface, law, factors.drive_end, states[k].reactions, std::move(velocity)))
+         status_with(interface, friction, factors.drive_end, states[k].reactions, std::move(velocity)))
       ++(status == ContactStatus::open    ? reports[k].open
          : status == ContactStatus::stick ? reports[k].stick
                                           : reports[k].slip);

@@ -62,6 +62,8 @@ void record(const StepReport& report, double h, const State& state, int directio
   history.contact_power.push_back(report.contact_work / h);
   history.load_power.push_back(report.load_work / h);
   history.drive_power.push_back(report.drive_work / h);
+  history.joint_work.resize(std::max(history.joint_work.size(), report.joint_work.size()));
+  for (std::size_t i = 0; i < report.joint_work.size(); ++i) history.joint_work[i] += report.joint_work[i];
   const PairView reactions(state.reactions, directions);
   double normal_force = 0;
   for (std::size_t pair = 0; pair < reactions.pairs(); ++pair) normal_force += reactions.normal(pair);
@@ -84,6 +86,7 @@ bool slides_as_at_equilibrium(const Interface& interface, const Equilibrium& equ
   for (std::size_t i = 0; i < status.size(); ++i)
   {
     if (equilibrium.closed[i] != (status[i] != ContactStatus::open)) return false;
+    if (is_undriven(interface, i)) continue; // the modes take it as stuck, whatever it does
     if (status[i] == ContactStatus::stick) return false;
     const std::span<const double> friction = PairView(reactions, interface.directions).tangential(i);
     if (dot(TangentView(drive, interface.directions).of(i), friction) < 0) return false;
@@ -179,7 +182,7 @@ void describe(Checkpoint& checkpoint, const MarchProgress& progress)
   State& state = progress.state;
   describe_all(checkpoint, summary.steps, summary.unconverged, summary.as_one, summary.first_unconverged,
                summary.contact_residual_max, summary.fall_of_friction_max, summary.energy_defect_max,
-               progress.iterations, state.time, state.reactions, progress.history.probes);
+               progress.iterations, state.time, state.reactions, progress.history.probes, progress.history.joint_work);
   for_each_series([&](auto, auto, auto& series) { describe(checkpoint, series); }, progress.history);
   const FileOrder order(progress.structure);
   order.describe(checkpoint, state.u);

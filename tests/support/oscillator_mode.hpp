@@ -36,7 +36,7 @@ struct Sliding
 inline Sliding persistent_sliding(const SmallModel& model, Complex guess)
 {
   const Structure& structure = model.structure;
-  const double mu = model.interface.friction.coefficient;
+  const double mu = model.interface.friction.common.coefficient;
   // y = y1 = y2 = 1: r = -(0.5 l^2 + 0.02 l + 1.2), (l^2 + 0.02 l + 1.1) x = 0.1 + mu r, and the pad's own
   // -0.1 x + l^2 + 0.02 l + 0.5 - r = 0
   const auto x_of = [&](Complex l) { return (0.1 - mu * (0.5 * l * l + 0.02 * l + 1.2)) / (l * l + 0.02 * l + 1.1); };

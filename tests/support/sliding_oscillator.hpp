@@ -9,7 +9,7 @@ namespace squeal::test
 /// Closed pair: y1 = y2 = y, r_n = -1.2 y, r_t = mu r_n:  1.1 x - 0.1 y = mu r_n,  -0.1 x + 0.5 y = r_n - 1.
 inline Equilibrium sliding_equilibrium(const SmallModel& oscillator)
 {
-  const double mu = oscillator.interface.friction.coefficient;
+  const double mu = oscillator.interface.friction.common.coefficient;
   const double y = -1 / (1.7 - 0.1 * (0.1 - 1.2 * mu) / 1.1), x = (0.1 - 1.2 * mu) * y / 1.1, r = -1.2 * y;
   Equilibrium equilibrium;
   equilibrium.outcome.kind = OutcomeKind::converged;

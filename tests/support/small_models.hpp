@@ -89,7 +89,7 @@ inline Interface make_interface(const Rows& B, int directions, const std::vector
   interface.directions = directions;
   interface.gap = gap;
   interface.drive = drive;
-  interface.friction.coefficient = friction;
+  interface.friction.common.coefficient = friction;
   PetscInt first = 0, last = 0, columns = 0, own_columns = 0;
   check(MatGetSize(K, nullptr, &columns));
   check(MatGetLocalSize(K, nullptr, &own_columns));

@@ -94,7 +94,7 @@ TEST_CASE("problems solved together have the answers of each alone, and what is 
     for (int k = 0; k < together; ++k) b.push_back(velocity_at(0.02 * step + 0.3 * k));
     std::vector<ContactProblem> problems;
     for (std::size_t k = 0; k < together; ++k) problems.push_back({b[k], r[k], memory[k]});
-    const auto results = solve_contacts(op, {0.4}, {}, problems);
+    const auto results = solve_contacts(op, FrictionLaw{0.4}, {}, problems);
     for (std::size_t k = 0; k < together; ++k)
     {
       CHECK(results[k].converged);

@@ -204,7 +204,7 @@ TEST_CASE("problems solved together have the answer of each alone on ranks that 
     for (double& entry : b[k]) entry *= 1 + 0.3 * static_cast<double>(k);
     problems.push_back({b[k], r[k], memory[k]});
   }
-  const std::vector<ContactResult> results = solve_contacts(W, {0.4}, {}, problems);
+  const std::vector<ContactResult> results = solve_contacts(W, FrictionLaw{0.4}, {}, problems);
   for (std::size_t k = 0; k < b.size(); ++k)
   {
     CHECK(results[k].converged);

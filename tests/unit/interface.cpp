@@ -163,13 +163,31 @@ TEST_CASE("one tangent is plane friction along it")
   }
 }
 
-TEST_CASE("friction without a drive, and a pair that cannot part, are refused")
+TEST_CASE("a contact has its own friction, and without a drive its pairs stick")
 {
   auto s = stack();
+  CHECK_FALSE(has_undriven_pairs(join(s).interface));
   s.scene.contacts[0].rotation->centre = {0.1, 0.1, 0}; // a corner pair sits on the axis
-  CHECK_THROWS_WITH_AS(join(s), doctest::Contains("at (0.100000, 0.100000, 0.000000) has no tangential drive"), Error);
-  s.scene.friction.coefficient = 0;
-  CHECK_NOTHROW(join(s));
+  const Interface on_axis = join(s).interface;
+  std::size_t undriven = 0;
+  for (std::size_t i = 0; i < on_axis.gap.size(); ++i) undriven += is_undriven(on_axis, i);
+  CHECK(undriven == 1);
+  s.scene.contacts[0].friction = FrictionLaw{0.1, true, 0.2, 3};
+  const Interface own = join(s).interface;
+  CHECK(own.friction.common.coefficient == 0.3);
+  for (std::size_t i = 0; i < own.gap.size(); ++i)
+  {
+    CHECK(own.friction.has_own(i));
+    CHECK(own.friction.of(i).coefficient == 0.1);
+    CHECK(own.friction.of(i).static_coefficient == 0.2);
+  }
+  s.scene.contacts[0].friction = FrictionLaw{0}; // a smooth stop
+  CHECK_FALSE(has_undriven_pairs(join(s).interface));
+}
+
+TEST_CASE("a pair that cannot part is refused")
+{
+  auto s = stack();
   s.scene.supports = {{"disc", all}, {"pad:z-", {false, false, true}}};
   CHECK_THROWS_WITH_AS(join(s), doctest::Contains("cannot move along its normal"), Error);
   s.scene.supports.clear();

@@ -87,7 +87,7 @@ TEST_CASE("B_n Z = 0 and (B_n + mu e.B_t) Y = 0, though every pair shares its de
   check(MatMatMult(model.interface.B, closed.Y, MAT_INITIAL_MATRIX, PETSC_DEFAULT, BY.put()));
   const Eigen::MatrixXd Z = dense_copy(BZ), Y = dense_copy(BY);
   REQUIRE(Z.size() == 9 * 9); // three rows a pair, and three of twelve degrees of freedom are gone
-  const double mu = model.interface.friction.coefficient;
+  const double mu = model.interface.friction.common.coefficient;
   for (Eigen::Index column = 0; column < 9; ++column)
     for (Eigen::Index i = 0; i < 9; i += 3)
     {

@@ -65,7 +65,7 @@ void check_model(const BrakeModel& model, const Scene& scene, const std::vector<
   CHECK(model.interface.gap == built.interface.gap);
   CHECK(model.interface.drive == built.interface.drive);
   CHECK(model.interface.compliance == built.interface.compliance);
-  CHECK(model.interface.friction.coefficient == built.interface.friction.coefficient);
+  CHECK(model.interface.friction.common.coefficient == built.interface.friction.common.coefficient);
 }
 
 struct Kind

@@ -393,6 +393,10 @@ TEST_CASE("a number is set through its member as a file would set it, and its ke
   CHECK(with("force.0.vector.2", -9).forces[0].vector[2] == -9);
   CHECK(with("contact.0.velocity.0", 2).contacts[0].velocity == Vec3{2, 0, 0});
   CHECK(with("friction.coefficient", 0.4).friction.coefficient == 0.4);
+  CHECK_THROWS_AS(with("contact.0.friction", 0.1), Error); // it has none of its own
+  scene.contacts[0].friction = FrictionLaw{0.2};
+  CHECK(with("contact.0.friction", 0.1).contacts[0].friction->coefficient == 0.1);
+  CHECK(with("friction.coefficient", 0.4).contacts[0].friction->coefficient == 0.2);
   CHECK(with("spring.0.direction.1", 1).springs[0].direction[1] == doctest::Approx(std::sqrt(0.5)));
   CHECK_THROWS_WITH_AS(with("spring.0.stiffness", -1),
                        "--set spring.0.stiffness=-1: [[spring]] stiffness = -1: expected zero or a positive number "
@@ -411,6 +415,7 @@ TEST_CASE("a number is set through its member as a file would set it, and its ke
   CHECK(effect("cycle.theta") == Effect::nothing);
   CHECK(effect("force.0.vector.2") == Effect::load);
   CHECK(effect("friction.coefficient") == Effect::friction);
+  CHECK(effect("contact.0.friction") == Effect::friction);
   CHECK(effect("contact.0.gap") == Effect::gap);
   CHECK(effect("contact.0.rotation.rate") == Effect::drive);
   CHECK(effect("damping.alpha") == Effect::damping);

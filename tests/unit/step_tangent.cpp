@@ -130,7 +130,7 @@ double relative_error(const Run& plus, const Run& minus, const TangentColumn& co
 /// Columns of a change of the state, of h and of mu, where all the motions compared have the same statuses.
 void compare(SmallModel& model, std::mt19937& random, double theta, int steps, Met& met)
 {
-  const double h = 0.15, friction = model.interface.friction.coefficient;
+  const double h = 0.15, friction = model.interface.friction.common.coefficient;
   const State start = random_state(model, random, 0.4), direction = random_state(model, random, 1);
   const Run middle = run(model, start, h, theta, steps);
   std::array<Run, 6> moved;
@@ -143,9 +143,9 @@ void compare(SmallModel& model, std::mt19937& random, double theta, int steps, M
     const auto at = static_cast<std::size_t>(sign);
     moved[at] = run(model, other, h, theta, steps);
     moved[2 + at] = run(model, start, h + change, theta, steps);
-    model.interface.friction.coefficient = friction + change;
+    model.interface.friction.common.coefficient = friction + change;
     moved[4 + at] = run(model, start, h, theta, steps);
-    model.interface.friction.coefficient = friction;
+    model.interface.friction.common.coefficient = friction;
   }
   for (const Run& other : moved)
     if (!same_branch(middle, other)) return;
@@ -179,7 +179,7 @@ TEST_CASE("the tangent of recorded steps is that of central differences")
         SmallModel model = two_masses(random, directions, 0.6);
         compare(model, random, theta, 12, met);
         if (sample % 2 == 0) continue;
-        model.interface.friction = {0.4, true, 0.7, 0.8};
+        model.interface.friction = FrictionLaw{0.4, true, 0.7, 0.8};
         compare(model, random, theta, 12, met);
       }
       CHECK(met.compared > 20);

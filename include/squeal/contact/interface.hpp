@@ -22,7 +22,7 @@ struct Interface
   std::vector<ContactPair> geometry;         // per pair; empty on a matrix scene
   std::vector<std::array<Vec3, 2>> tangents; // [-] t1 and t2 per pair; t2 is zero where there is one direction
   std::vector<double> compliance;            // [m/N] per pair, in series with it; empty: all pairs are rigid
-  FrictionLaw friction;
+  PairFriction friction;
 
   /// Of a contact vector.
   std::size_t size() const { return PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs)); }
@@ -36,8 +36,7 @@ struct BrakeModel
 };
 
 /// Rows n, t1, t2 of every pair: n.w and t.w, with w the weighted sum of its nodes' displacements. Tangents: the
-/// scene's, else t1 along the drive. Pairs are whole on every rank, T on rank 0. Error: zero drive velocity at a pair
-/// where mu > 0. Collective.
+/// scene's, else t1 along the drive. Pairs are whole on every rank, T on rank 0. Collective.
 Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& scene, const DofMap& dofs, MPI_Comm comm);
 
 /// B.petsc gap.petsc drive.petsc of a folder; directions = (rows of B) / pairs - 1. No pairs where none is there.
@@ -45,7 +44,7 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
 Interface read_interface(const std::filesystem::path& folder, const Structure& structure, const FrictionLaw& friction,
                          MPI_Comm comm);
 
-/// Throws Error for a pair that cannot move along its normal, or whose friction has no direction. Collective.
+/// Throws Error for a pair that cannot move along its normal. Collective.
 void check_interface(const Interface& interface, const std::string& source, MPI_Comm comm);
 
 /// B x, whole on every rank. Collective.
@@ -65,6 +64,12 @@ inline double compliance_of(const Interface& interface, std::size_t pair)
 
 /// |v_d| of a pair [m/s]. Not collective.
 double drive_speed(const Interface& interface, std::size_t pair);
+
+/// Whether no drive makes a pair slide, and friction may hold it. Not collective.
+bool is_undriven(const Interface& interface, std::size_t pair);
+
+/// Whether any of the pairs is. Not collective.
+bool has_undriven_pairs(const Interface& interface);
 
 /// Unit drive direction e = v_d/|v_d| of every pair, as TangentView reads it: reactions of steady sliding are
 /// r_t = mu(|v_d|) r_n e.

@@ -14,8 +14,8 @@
 ///
 /// In a direction in which neither side can move (a zero row of W), r_t opposes the drive while the pair slides along
 /// it, although it moves nothing. At rest there, r_t is zero along it.
+#include "squeal/contact/pair_friction.hpp"
 #include "squeal/contact/pairs.hpp"
-#include "squeal/scene/scene.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -23,13 +23,6 @@
 
 namespace squeal
 {
-
-/// mu and its derivative in the sliding speed.
-struct FrictionCoefficient
-{
-  double value;      // [-]
-  double derivative; // [s/m]
-};
 
 /// Without the guard of std::hypot against squares out of range, which takes ten times as long: reactions and
 /// velocities never have such squares.
@@ -58,11 +51,18 @@ inline double steepest_fall(const FrictionLaw& law)
   return law.decay_speed == 0 ? 0 : std::max(0., law.static_coefficient - law.coefficient) / law.decay_speed;
 }
 
-/// The law as a function of |w_t| where the sliding speed is `part` |w_t|.
-inline FrictionLaw law_of_step(FrictionLaw law, double part)
+/// The steepest fall of all of them.
+inline double steepest_fall(const PairFriction& friction)
 {
-  law.decay_speed /= part;
-  return law;
+  double fall = steepest_fall(friction.common);
+  for (const FrictionLaw& law : friction.own) fall = std::max(fall, steepest_fall(law));
+  return fall;
+}
+
+/// The laws as functions of |w_t| where the sliding speed is `part` |w_t|.
+inline PairFriction law_of_step(const PairFriction& friction, double part)
+{
+  return changed(friction, [part](FrictionLaw& law) { law.decay_speed /= part; });
 }
 
 /// mu at the sliding speed of w.
@@ -154,7 +154,7 @@ ContactStatus contact_status(const PairVector& r, const PairVector& w, const Fri
 
 /// `w`: contact velocities, which are read where mu depends on the speed; may be empty elsewhere.
 std::vector<ContactStatus> contact_status(PairView<const double> reactions, PairView<const double> w,
-                                          const FrictionLaw& law);
+                                          const PairFriction& friction);
 
 /// The normal law of a step for a pair with a compliance c > 0 (src/README.md, section 4.16):
 /// w_n = by_gap g + by_rate B_n v + B_n v+ + by_reaction r_n.

@@ -65,11 +65,11 @@ struct ContactProblem
 
 /// Solves all problems, each from its `r`, which becomes the solution [N]. A problem that does not converge says so
 /// in its result. On rank 0, while the ranks that share W are within ServedProducts.
-std::vector<ContactResult> solve_contacts(const ContactOperator& W, const FrictionLaw& friction,
+std::vector<ContactResult> solve_contacts(const ContactOperator& W, const PairFriction& friction,
                                           const ContactSettings& settings, std::span<const ContactProblem> problems);
 
 /// The residual above of reactions r to the free velocities b. On the rank that has W.
-double contact_residual(const ContactOperator& W, const FrictionLaw& friction, const std::vector<double>& b,
+double contact_residual(const ContactOperator& W, const PairFriction& friction, const std::vector<double>& b,
                         const std::vector<double>& r);
 
 } // namespace squeal

@@ -17,6 +17,7 @@
 #include "squeal/equilibrium/state.hpp"
 
 #include <memory>
+#include <optional>
 
 namespace squeal
 {
@@ -30,6 +31,18 @@ enum class Uniqueness
 };
 
 template <> inline constexpr std::array words_of<Uniqueness> = {"not checked", "assured", "not assured"};
+
+/// How a structure with undriven pairs came to its equilibrium, and what is known of it (src/README.md, section 2.9).
+struct LoadHistory
+{
+  int increments = 0;                    // of the path in all
+  double change = 0;                     // [-] of reactions over the largest of their contact, from half as many
+  int stick = 0, slip = 0, open = 0;     // undriven pairs, by the last increment
+  int at_limit = 0;                      // those that stick within 1 % of their friction
+  int index = 0;                         // sign of the determinant of the status system: -1 no rate follows
+  double reciprocal_condition = 0;       // of that system, by its pivots
+  std::vector<ContactStatus> statuses{}; // of all pairs
+};
 
 /// outcome: "converged", "no equilibrium" (the status sets cycle, or no set balances the load: mu is too large),
 /// "not converged". u and the reactions are zero without an equilibrium.
@@ -45,6 +58,7 @@ struct Equilibrium
   double force_residual = 0;      // |K u - F - B'r| / |F|
   double auxiliary_stiffness = 0; // kappa [N/m]; 0: K holds the structure by itself
   Uniqueness uniqueness = Uniqueness::not_checked;
+  std::optional<LoadHistory> history{}; // where there are undriven pairs
 };
 
 /// How an equilibrium is sought.
@@ -52,6 +66,8 @@ struct EquilibriumOptions
 {
   FactorOptions factor{};
 };
+
+struct PathOperators;
 
 /// Equilibria of models of one layout, one after the other. The stiffness factored and the compliance D of the pairs,
 /// on their normals and the axes they slide along, are kept while the models share K and B and have these axes.
@@ -74,9 +90,12 @@ public:
   struct Kept;
 
 private:
+  Equilibrium at_end_of_path(const Structure& structure, const Interface& interface);
+
   EquilibriumOptions options_;
   std::unique_ptr<Kept> kept_;
-  std::vector<char> expected_{}; // empty: none are
+  std::unique_ptr<PathOperators> path_kept_; // of structures with undriven pairs
+  std::vector<char> expected_{};             // empty: none are
   int factors_ = 0;
 };
 

@@ -4,6 +4,7 @@
 /// While the pairs that are closed at equilibrium stay closed, B_n du = 0 on them. The normal reaction lambda_n of a
 /// sliding pair enters as R' lambda_n, R = B_n + mu e.B_t, with e the direction of the drive:
 ///     du = Z y,  B_n Z = 0,      Y'(equations),  R Y = 0.
+/// A closed pair without a drive sticks: B_n du = 0 and B_t du = 0 in both bases (section 3.14).
 /// Both bases follow from one sparse Gauss-Jordan elimination of one degree of freedom a pair, its pivot. They are the
 /// identity on the degrees of freedom that remain, so y is du there.
 #include "squeal/equilibrium/equilibrium.hpp"
@@ -16,10 +17,11 @@ namespace squeal
 /// Bases that keep the closed pairs closed.
 struct ClosedContact
 {
-  Owned<Mat> Z, Y;            // dofs x (dofs - closed pairs)
+  Owned<Mat> Z, Y;            // dofs x (dofs - rows eliminated)
   Owned<Mat> reaction;        // pairs x dofs: lambda_n = reaction f of forces f = R' lambda_n + g, g = 0 on the pivots
   Owned<Mat> normal_reaction; // the same of forces f = B_n' lambda + g
   std::vector<int> pairs;     // the closed ones, ascending
+  int dependent_rows = 0;     // of pairs that stick, which the other rows imply: left out
   std::vector<PetscInt> pivots; // the degrees of freedom that are eliminated, ascending
 };
 

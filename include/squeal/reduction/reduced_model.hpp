@@ -40,19 +40,19 @@ struct ReducedModel
   Eigen::LLT<Eigen::MatrixXd> E_factor, M_factor; // of K_z + omega^2 M_z, M_z
   std::vector<int> active;                        // pairs, ascending
   int directions = 2;                             // tangential ones of an active pair; 0: friction follows
-  FrictionLaw friction;
-  std::vector<double> gap;        // [m] at equilibrium, per active pair
-  std::vector<double> compliance; // [m/N] per active pair; 0: rigid
-  std::vector<double> drive;      // [m/s] as TangentView reads it
-  std::vector<double> reactions;  // [N] r0, a contact vector
-  MultiVector shapes;             // Z V, dofs x size: u = u0 + shapes q
-  double omega = 0;               // [rad/s] of the followed mode
-  int modes = 0, attachments = 0; // columns that V came from
-  int left_out = 0;               // attachments that it has no room for
-  double lost_compliance = 0;     // [-] mean part of the active pairs' own compliance that is theirs
-  Eigen::VectorXd of_left_out;    // [m/N] per active pair: of its own compliance, what they have; empty: nothing
-  Eigen::Index slow = 0;          // those that swing by less than four times omega, the first ones
-  Eigen::MatrixXd apart;          // coordinates of what the modes kept apart add to all others, orthonormal columns
+  PairFriction friction;                          // of the active pairs
+  std::vector<double> gap;                        // [m] at equilibrium, per active pair
+  std::vector<double> compliance;                 // [m/N] per active pair; 0: rigid
+  std::vector<double> drive;                      // [m/s] as TangentView reads it
+  std::vector<double> reactions;                  // [N] r0, a contact vector
+  MultiVector shapes;                             // Z V, dofs x size: u = u0 + shapes q
+  double omega = 0;                               // [rad/s] of the followed mode
+  int modes = 0, attachments = 0;                 // columns that V came from
+  int left_out = 0;                               // attachments that it has no room for
+  double lost_compliance = 0;                     // [-] mean part of the active pairs' own compliance that is theirs
+  Eigen::VectorXd of_left_out; // [m/N] per active pair: of its own compliance, what they have; empty: nothing
+  Eigen::Index slow = 0;       // those that swing by less than four times omega, the first ones
+  Eigen::MatrixXd apart;       // coordinates of what the modes kept apart add to all others, orthonormal columns
 
   int size() const { return static_cast<int>(M.rows()); }
 };

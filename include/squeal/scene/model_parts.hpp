@@ -140,6 +140,16 @@ struct Pressure
   double value = 0; // [Pa] positive towards the solid
 };
 
+/// Coulomb's law with mu(s) = coefficient + (static_coefficient - coefficient) exp(-s/decay_speed) at the sliding speed
+/// s.
+struct FrictionLaw
+{
+  double coefficient = 0;        // [-]
+  bool direction_damping = true; // keep mu r_n/|v_d| (I - e e') in the modes (src/README.md, section 3.3)
+  double static_coefficient = 0; // [-] mu at rest; of no meaning without a decay_speed
+  double decay_speed = 0;        // [m/s] 0: mu is `coefficient` at every speed
+};
+
 /// The side of a contact whose nodes have the pairs.
 enum class SlaveSide
 {
@@ -154,17 +164,24 @@ template <> inline constexpr std::array words_of<SlaveSide> = {"stator", "rotor"
 /// - v_d (src/README.md, section 1.2).
 struct Contact
 {
-  std::string rotor;                // surface or point that the drive moves
-  std::string stator;               // surface or point that slides on it
-  double gap = 0;                   // [m] initial gap, positive if open
-  std::optional<Vec3> normal;       // [-] unit, out of the rotor; required for points, else the slave surface's
-  std::vector<Vec3> tangents;       // [-] one: plane friction along it; two; empty: two chosen from the normal
-  std::optional<Rotation> rotation; // of the rotor: v_d is the tangential part of rate axis x (x - centre)
-  Vec3 velocity{};                  // [m/s] of the rotor's surface if there is no rotation
-  double reach = 0;                 // [m] largest distance of the surfaces along the normal
-  SlaveSide slave{};                // has one pair a node
-  double compliance = 0;            // [m3/N] approach over pressure, in series with the pairs; [m/N] of points
+  std::string rotor;                     // surface or point that the drive moves
+  std::string stator;                    // surface or point that slides on it
+  double gap = 0;                        // [m] initial gap, positive if open
+  std::optional<Vec3> normal;            // [-] unit, out of the rotor; required for points, else the slave surface's
+  std::vector<Vec3> tangents;            // [-] one: plane friction along it; two; empty: two chosen from the normal
+  std::optional<Rotation> rotation;      // of the rotor: v_d is the tangential part of rate axis x (x - centre)
+  Vec3 velocity{};                       // [m/s] of the rotor's surface if there is no rotation
+  double reach = 0;                      // [m] largest distance of the surfaces along the normal
+  SlaveSide slave{};                     // has one pair a node
+  double compliance = 0;                 // [m3/N] approach over pressure, in series with the pairs; [m/N] of points
+  std::optional<FrictionLaw> friction{}; // if absent, the scene's
 };
+
+/// Whether nothing drives the rotor of a contact: its pairs stick or slip by what acts on them alone.
+inline bool is_undriven(const Contact& contact)
+{
+  return !contact.rotation && contact.velocity == Vec3{};
+}
 
 /// Two surfaces of parts meshed apart that move as one; nodes of the slave follow the master.
 struct Tie
@@ -172,16 +189,6 @@ struct Tie
   std::string slave;  // named surface, the finer or softer one, or curve, the edge of a shell
   std::string master; // named surface
   double reach = 0;   // [m] largest distance of the surfaces along the normal
-};
-
-/// Coulomb's law with mu(s) = coefficient + (static_coefficient - coefficient) exp(-s/decay_speed) at the sliding speed
-/// s.
-struct FrictionLaw
-{
-  double coefficient = 0;        // [-]
-  bool direction_damping = true; // keep mu r_n/|v_d| (I - e e') in the modes (src/README.md, section 3.3)
-  double static_coefficient = 0; // [-] mu at rest; of no meaning without a decay_speed
-  double decay_speed = 0;        // [m/s] 0: mu is `coefficient` at every speed
 };
 
 /// Rights of the statements in a geometry.

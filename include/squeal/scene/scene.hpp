@@ -40,6 +40,24 @@ enum class StartKind
 
 template <> inline constexpr std::array words_of<StartKind> = {"mode", "estimate", "equilibrium", "rest", "file"};
 
+/// A displacement and velocity that a transient starts with, of all nodes of a group, beside its start.
+struct InitialMotion
+{
+  std::string on;      // point, rigid body or group
+  Vec3 displacement{}; // [m]
+  Vec3 velocity{};     // [m/s]
+};
+
+/// A step of the load path, by what acts at its end. Structures whose contacts all have a drive depend on no path.
+struct LoadStep
+{
+  std::string name;
+  double load = 1;               // [-] on all forces and pressures
+  std::vector<double> forces;    // [-] beside it, one a force; empty: 1
+  std::vector<double> pressures; // [-] one a pressure; empty: 1
+  double friction = 1;           // [-] on the coefficients of driven contacts
+};
+
 /// Where a transient starts.
 struct Start
 {
@@ -263,6 +281,8 @@ struct Scene
   std::vector<Force> forces;
   std::vector<Pressure> pressures;
   std::vector<Contact> contacts;
+  std::vector<LoadStep> steps; // to the scene's loads and friction, in order; empty: at once
+  std::vector<InitialMotion> initial;
   std::vector<Tie> ties;
   FrictionLaw friction;
   RayleighDamping damping; // of parts without their own

@@ -9,18 +9,27 @@
 namespace squeal
 {
 
+/// The end of a step of the load path. What it changes rises or falls in proportion from the end of the step before.
+struct PathStep
+{
+  std::string name;
+  Owned<Vec> load;            // [N, N m]
+  double driven_friction = 1; // [-] on the coefficients of driven pairs
+};
+
 /// The matrices have one common non-zero pattern and are marked as symmetric.
 struct Structure
 {
-  Owned<Mat> M;              // [kg, kg m, kg m2]
-  Owned<Mat> C;              // [N s/m, N s, N m s]
-  Owned<Mat> K;              // [N/m, N, N m]
-  Owned<Mat> G;              // [N s/m] skew, gyroscopic; null: none
-  Owned<Mat> H;              // [N/m] skew, circulatory; null: none
-  Owned<Mat> K_loss;         // [N/m] sum of eta K of the parts with a loss factor eta; null: none
-  double loss_omega = 0;     // [rad/s] C holds K_loss/loss_omega; 0: none of it
-  Owned<Vec> load;           // [N, N m]
-  std::int64_t elements = 0; // number of elements; 0 on a matrix scene
+  Owned<Mat> M;                 // [kg, kg m, kg m2]
+  Owned<Mat> C;                 // [N s/m, N s, N m s]
+  Owned<Mat> K;                 // [N/m, N, N m]
+  Owned<Mat> G;                 // [N s/m] skew, gyroscopic; null: none
+  Owned<Mat> H;                 // [N/m] skew, circulatory; null: none
+  Owned<Mat> K_loss;            // [N/m] sum of eta K of the parts with a loss factor eta; null: none
+  double loss_omega = 0;        // [rad/s] C holds K_loss/loss_omega; 0: none of it
+  Owned<Vec> load;              // [N, N m]
+  std::vector<PathStep> path{}; // the way to it, which undriven pairs depend on; empty: in proportion, sliding
+  std::int64_t elements = 0;    // number of elements; 0 on a matrix scene
   DofNames names;
 };
 

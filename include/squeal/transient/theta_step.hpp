@@ -49,6 +49,14 @@ void multiply_mass_and_stiffness(const ThetaStep& step, const Structure& structu
                                  const std::array<std::span<const Vec>, 2>& of,
                                  const std::array<std::span<const Vec>, 2>& to);
 
+/// Where undriven pairs began to stick: B_t ut of theirs [m], as a contact vector. A pair that sticks is led back
+/// there, so that what solvers leave does not add up to drift.
+struct StickAnchors
+{
+  std::vector<double> at;    // empty: no pair has stuck
+  std::vector<char> is_held; // by pairs
+};
+
 /// The products of a state that a step starts from and leaves behind for the next one, and its work vectors. A step
 /// takes two multiplications and one solve. Belongs to one state and one ThetaStep.
 struct StepWork
@@ -59,6 +67,7 @@ struct StepWork
   ContactMemory memory;                 // of the reactions, on rank 0
   double energy = 0;                    // [J]
   StepRecord* record = nullptr;         // of the next step, borrowed; null: none is wanted
+  StickAnchors anchors{};
 };
 
 /// Factors in one step on the scene's load, drive velocities and friction coefficients.
@@ -104,8 +113,9 @@ struct StepReport
   int contact_iterations = 0;
   double contact_residual = 0; // natural map, relative
   bool contact_converged = true;
-  bool contact_as_one = false; // as of ContactResult
-  double fall_of_friction = 0; // largest |mu'| r_n W_t of a pair, at rest: at 1 the step may have several solutions
+  bool contact_as_one = false;    // as of ContactResult
+  double fall_of_friction = 0;    // largest |mu'| r_n W_t of a pair, at rest: at 1 the step may have several solutions
+  std::vector<double> joint_work; // [J] of the undriven pairs of each contact; empty: there are none
 };
 
 /// One step in place of several trajectories: each reading of the factor and of W serves them all.

@@ -23,6 +23,7 @@ struct History
   std::vector<double> normal_force;                             // [N] sum of r_n
   std::vector<int> open, stick, slip;
   std::vector<std::vector<double>> probes; // [probe][step] [m]
+  std::vector<double> joint_work;          // [J] of the undriven pairs of each contact, over all steps
 };
 
 /// Calls visit(name, unit, series of each history...) for each series but those of the probes.

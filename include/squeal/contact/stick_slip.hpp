@@ -1,0 +1,95 @@
+#pragma once
+/// Contact at rest where some pairs have no drive and stick, slip or open by what acts on them (src/README.md, section
+/// 2.9). One increment of the load, over all rows of the pairs:
+///     N w = q + M r,   w: gaps, with the approach of the pairs' compliance, and slips of the increment,
+///     0 <= w_n _|_ r_n >= 0;   undriven: |r_t| <= mu r_n, r_t = -mu r_n w_t/|w_t| where w_t is not 0;
+///     driven: r_t = mu r_n e.
+/// Semismooth Newton on the statuses. A status leaves each pair as many unknowns as it has rows, and a linear system.
+/// The step in time has the same law with velocities for displacements. Arithmetic of one rank.
+#include "squeal/contact/pair_law.hpp"
+
+#include <Eigen/LU>
+
+namespace squeal
+{
+
+/// What increments share.
+struct StickSlipOperator
+{
+  Eigen::MatrixXd N, M; // rows x rows
+  int directions = 1;
+  std::vector<NaturalScale> rho; // [N/m] of each pair, by its own block of M
+  double compliance = 0;         // [m/N] the largest diagonal entry of M
+  std::vector<int> contact;      // number of each pair's: reactions are judged by the largest of their contact
+};
+
+/// `contact`: as above.
+StickSlipOperator make_stick_slip_operator(Eigen::MatrixXd N, Eigen::MatrixXd M, int directions,
+                                           std::vector<int> contact);
+
+/// The friction of the pairs in one increment.
+struct StickSlipFriction
+{
+  std::vector<double> mu; // [-] per pair
+  std::vector<double> e;  // [-] of driven pairs, zero of undriven ones, as TangentView reads it
+};
+
+/// Reactions and motions of the pairs, contact vectors.
+struct StickSlipState
+{
+  Eigen::VectorXd r, w; // [N, m]
+};
+
+/// The system of the statuses that an increment ended with, factored.
+class StatusSystem
+{
+public:
+  StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at);
+
+  /// The change of the state within the statuses by which N w - M r grows by `rhs`, and the laws' residual goes.
+  StickSlipState change(const Eigen::VectorXd& rhs) const;
+
+  /// The same without the laws' residual.
+  StickSlipState response(const Eigen::VectorXd& rhs) const;
+
+  const std::vector<ContactStatus>& statuses() const { return statuses_; }
+  int index() const;                   // sign of the determinant; that of all pairs open, or stuck, is 1
+  double reciprocal_condition() const; // smallest over largest pivot
+
+private:
+  /// dr = r + R y and dw = w + W y fulfil the linearised law of a pair for all y. Force-like unknowns are scaled.
+  struct PairSystem
+  {
+    Eigen::Vector3d r{0, 0, 0}, w{0, 0, 0};
+    Eigen::Matrix3d R = Eigen::Matrix3d::Zero(), W = Eigen::Matrix3d::Zero();
+    int forces = 0; // unknowns that are forces, whose columns have the other sign
+  };
+  PairSystem system_of(std::size_t pair, const StickSlipFriction& friction, const StickSlipState& at);
+  void close(PairSystem& system, std::size_t pair, const StickSlipFriction& friction, const StickSlipState& at);
+  StickSlipState spread(const Eigen::VectorXd& y) const;
+
+  const StickSlipOperator& of_;
+  std::vector<PairSystem> pairs_;
+  std::vector<ContactStatus> statuses_;
+  Eigen::MatrixXd matrix_;
+  Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
+  StickSlipState particular_; // y = 0
+};
+
+/// The largest miss of a pair's law, over the largest reaction of its contact.
+double stick_slip_residual(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at);
+
+/// How an increment ended.
+struct StickSlipSolution
+{
+  StickSlipState state;
+  int iterations = 0;
+  double residual = 0; // of the laws, and of N w = q + M r over M's part in it
+  bool converged = false;
+};
+
+/// Solves one increment from a guess.
+StickSlipSolution solve_stick_slip(const StickSlipOperator& of, const StickSlipFriction& friction,
+                                   const Eigen::VectorXd& q, StickSlipState guess);
+
+} // namespace squeal

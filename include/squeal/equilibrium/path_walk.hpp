@@ -1,0 +1,55 @@
+#pragma once
+/// The way along a load path on the rows of the pairs, increment by increment (src/README.md, section 2.9): statuses,
+/// locked-in friction, and where it ends if there is no equilibrium beyond. Arithmetic of one rank.
+#include "squeal/contact/stick_slip.hpp"
+
+#include <optional>
+#include <string>
+
+namespace squeal
+{
+
+/// A step of the path, by what acts at its end.
+struct PathEnd
+{
+  std::string name;
+  Eigen::VectorXd q;          // [m] motion of the rows by the load alone
+  double driven_friction = 1; // [-] on the coefficients of driven pairs
+};
+
+/// A path from the state without load.
+struct PathProblem
+{
+  const StickSlipOperator& of;
+  double kappa = 0;           // [N/m] of the springs across all rows: N = 1 - kappa D
+  std::vector<double> gap;    // [m] per pair
+  StickSlipFriction friction; // at the factor 1
+  std::vector<PathEnd> ends;
+};
+
+/// Where a walk came to.
+struct PathWalk
+{
+  bool completed = false;
+  std::string reason;           // why not
+  StickSlipState state;         // at the end of the last increment
+  Eigen::VectorXd offset;       // [m] of the rows in it: gaps, and minus the anchors of friction
+  Eigen::VectorXd q;            // [m] by the load, with the offset
+  StickSlipFriction friction{}; // in it
+  std::size_t step = 0;         // that the walk is in
+  double part = 0;              // [-] of it
+  int increments = 0, iterations = 0;
+  double change = 0;       // [-] of reactions, over the largest of their contact, from half as many increments
+  double largest_move = 0; // [m] of a row in one increment, the first of the path aside
+};
+
+/// Walks along the path, with increments halved until reactions change by less than a thousandth. A load in proportion
+/// from closed gaps takes one: the problem has no scale.
+PathWalk walk_path(const PathProblem& problem);
+
+/// The motion of the rows that the load drives and no forces of closed pairs within their friction resist, where there
+/// is one: no equilibrium exists then, whatever the path. `q`: by the load alone.
+std::optional<Eigen::VectorXd> unresisted_motion(const PathProblem& problem, const StickSlipFriction& friction,
+                                                 const Eigen::VectorXd& q);
+
+} // namespace squeal

@@ -1,0 +1,289 @@
+#include "squeal/contact/stick_slip.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <Eigen/Dense>
+#include <limits>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double tight = 1e-12, good = 1e-9; // of the residual: where iterations end, and what counts as solved
+constexpr double rounding = 1e-9;            // of the largest reaction: a pair that only grazes is no open one
+
+Vector3d entries(const VectorXd& x, std::size_t pair, int directions)
+{
+  const PairVector v = PairView<const double>(x, directions).vector(pair);
+  return {v[0], v[1], v[2]};
+}
+
+/// A pair before a step of the iteration.
+struct PairState
+{
+  Vector3d r, w;
+  double mu;
+  Eigen::Vector2d e; // of the drive; zero: it has none
+  NaturalScale rho;
+  double grazing; // [N] that no sign is read from
+
+  double pressing() const { return r[0] - rho.normal * w[0]; }
+  Eigen::Vector2d pulling() const { return r.tail<2>() - rho.tangential * w.tail<2>(); }
+
+  ContactStatus status() const
+  {
+    if (pressing() < -grazing) return ContactStatus::open;
+    const bool sticks = e.isZero(0) && mu > 0 && pulling().norm() <= mu * pressing();
+    return sticks ? ContactStatus::stick : ContactStatus::slip;
+  }
+
+  /// What the law misses [N], r - proj(r - rho w) with the disc of the projected normal reaction.
+  Vector3d defect() const
+  {
+    Vector3d result = r;
+    if (pressing() <= 0) return result;
+    result[0] = rho.normal * w[0];
+    if (status() == ContactStatus::stick)
+      result.tail<2>() = rho.tangential * w.tail<2>();
+    else if (!e.isZero(0))
+      result.tail<2>() -= mu * r[0] * e;
+    else if (const double size = pulling().norm(); size > 0)
+      result.tail<2>() -= mu * pressing() / size * pulling();
+    return result;
+  }
+};
+
+PairState pair_state(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at,
+                     std::size_t pair)
+{
+  const std::span<const double> e = TangentView<const double>(friction.e, of.directions).of(pair);
+  return {entries(at.r, pair, of.directions),
+          entries(at.w, pair, of.directions),
+          friction.mu[pair],
+          {e[0], e.size() > 1 ? e[1] : 0},
+          of.rho[pair],
+          rounding * at.r.lpNorm<Eigen::Infinity>()};
+}
+
+/// What the defects of each contact's pairs are compared with [N]: its largest reaction, or a small part of all
+/// contacts' and of what slips would take, where a contact is about to open.
+std::vector<double> scales_of(const StickSlipOperator& of, const StickSlipState& at)
+{
+  constexpr double small = 1e-4; // beside it rounding of the others stays below the tolerance
+  double all = 0;
+  for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
+    all = std::max({all, entries(at.r, pair, of.directions).norm(),
+                    entries(at.w, pair, of.directions).tail<2>().norm() / of.compliance});
+  std::vector<double> scale;
+  for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
+  {
+    const auto contact = static_cast<std::size_t>(of.contact[pair]);
+    scale.resize(std::max(scale.size(), contact + 1), small * all);
+    scale[contact] = std::max(scale[contact], entries(at.r, pair, of.directions).norm());
+  }
+  return scale;
+}
+
+/// |N w - q - M r| over the part of reactions and motions in it.
+double imbalance(const StickSlipOperator& of, const VectorXd& q, const StickSlipState& at)
+{
+  const double scale = std::max(
+      {q.lpNorm<Eigen::Infinity>(), at.w.lpNorm<Eigen::Infinity>(), of.compliance * at.r.lpNorm<Eigen::Infinity>()});
+  return scale > 0 ? (of.N * at.w - q - of.M * at.r).lpNorm<Eigen::Infinity>() / scale : 0;
+}
+
+double sum_of_squares(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
+{
+  double sum = 0;
+  for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
+    sum += pair_state(of, friction, at, pair).defect().squaredNorm();
+  return sum;
+}
+
+} // namespace
+
+StickSlipOperator make_stick_slip_operator(MatrixXd N, MatrixXd M, int directions, std::vector<int> contact)
+{
+  StickSlipOperator result{std::move(N), std::move(M), directions, {}, 0, std::move(contact)};
+  result.compliance = result.M.diagonal().maxCoeff();
+  const PairRows<Index> rows(directions);
+  for (Index pair = 0; pair < static_cast<Index>(result.contact.size()); ++pair)
+  {
+    PairBlock own{};
+    for (Index k = 0; k < rows.per_pair(); ++k)
+      own[static_cast<std::size_t>(k)][static_cast<std::size_t>(k)] =
+          result.M(rows.normal(pair) + k, rows.normal(pair) + k);
+    result.rho.push_back(natural_scale(own, result.compliance));
+  }
+  return result;
+}
+
+double stick_slip_residual(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
+{
+  const std::vector<double> scale = scales_of(of, at);
+  double worst = 0;
+  for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
+    if (const double defect = pair_state(of, friction, at, pair).defect().norm(); defect > 0)
+    {
+      const double own = scale[static_cast<std::size_t>(of.contact[pair])];
+      worst = std::max(worst, own > 0 ? defect / own : std::numeric_limits<double>::infinity());
+    }
+  return worst;
+}
+
+/// The unknowns of a closed pair: r_n first; then the friction of a pair that sticks, or the slip of one that slips.
+void StatusSystem::close(PairSystem& system, std::size_t pair, const StickSlipFriction& friction,
+                         const StickSlipState& at)
+{
+  const PairState state = pair_state(of_, friction, at, pair);
+  const double force = 1 / of_.compliance, h = state.pressing();
+  system.w[0] = -state.w[0];
+  system.R(0, 0) = force;
+  system.forces = 1;
+  if (state.status() == ContactStatus::stick)
+  {
+    system.w.tail<2>() = -state.w.tail<2>();
+    system.R(1, 1) = system.R(2, 2) = force;
+    system.forces = 1 + of_.directions;
+    return;
+  }
+  if (!state.e.isZero(0) || state.mu == 0)
+  {
+    system.r.tail<2>() = state.mu * state.r[0] * state.e - state.r.tail<2>();
+    system.R.block<2, 1>(1, 0) = state.mu * force * state.e;
+    system.W(1, 1) = system.W(2, 2) = 1;
+    return;
+  }
+  // dr_t - mu d dh - a (1 - d d')(dr_t - rho dw_t) = mu h d - r_t,  dh = dr_n + rho_n w_n,  a = mu h/|t|
+  const Eigen::Vector2d t = state.pulling(), d = t / t.norm(), across(-d[1], d[0]);
+  const double a = state.mu * h / t.norm(), size = (1 - a) * (1 - a) + a * a, rest = -across.dot(state.r.tail<2>());
+  system.R.block<2, 1>(1, 0) = state.mu * force * d;
+  system.r.tail<2>() =
+      (state.mu * (h + state.rho.normal * state.w[0]) - d.dot(state.r.tail<2>())) * d + (1 - a) * rest / size * across;
+  system.w.tail<2>() = a * rest / (state.rho.tangential * size) * across;
+  system.W.block<2, 1>(1, 1) = of_.directions == 1 ? Eigen::Vector2d(1, 0) : d; // no turn: the index keeps its sign
+  system.W.block<2, 1>(1, 2) = (1 - a) * across;
+  system.R.block<2, 1>(1, 2) = -a * state.rho.tangential * across;
+}
+
+StatusSystem::PairSystem StatusSystem::system_of(std::size_t pair, const StickSlipFriction& friction,
+                                                 const StickSlipState& at)
+{
+  PairSystem system;
+  const PairState state = pair_state(of_, friction, at, pair);
+  statuses_.push_back(state.status());
+  if (statuses_.back() == ContactStatus::open)
+  {
+    system.r = -state.r;
+    system.W.setIdentity();
+  }
+  else
+    close(system, pair, friction, at);
+  return system;
+}
+
+StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
+    : of_(of), matrix_(of.M.rows(), of.M.cols())
+{
+  const PairRows<Index> rows(of.directions);
+  const Index own = rows.per_pair();
+  particular_ = {VectorXd::Zero(of.M.rows()), VectorXd::Zero(of.M.rows())};
+  for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
+  {
+    const PairSystem& system = pairs_.emplace_back(system_of(pair, friction, at));
+    const Index first = rows.normal(static_cast<Index>(pair));
+    matrix_.middleCols(first, own).noalias() = of.N.middleCols(first, own) * system.W.topLeftCorner(own, own);
+    matrix_.middleCols(first, own).noalias() -= of.M.middleCols(first, own) * system.R.topLeftCorner(own, own);
+    particular_.r.segment(first, own) = system.r.head(own);
+    particular_.w.segment(first, own) = system.w.head(own);
+    for (Index k = 0; k < own; ++k) // a row in which neither side moves leaves its friction open: it stays
+      if (matrix_.col(first + k).isZero(0)) matrix_(first + k, first + k) = -1;
+  }
+  factors_.compute(matrix_);
+}
+
+StickSlipState StatusSystem::spread(const VectorXd& y) const
+{
+  StickSlipState result{VectorXd(y.size()), VectorXd(y.size())};
+  const PairRows<Index> rows(of_.directions);
+  const Index own = rows.per_pair();
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair)
+  {
+    const Index first = rows.normal(static_cast<Index>(pair));
+    result.r.segment(first, own) = pairs_[pair].R.topLeftCorner(own, own) * y.segment(first, own);
+    result.w.segment(first, own) = pairs_[pair].W.topLeftCorner(own, own) * y.segment(first, own);
+  }
+  return result;
+}
+
+StickSlipState StatusSystem::response(const VectorXd& rhs) const
+{
+  if (reciprocal_condition() > 1e-13) return spread(factors_.solve(rhs));
+  // rows of pairs that depend on each other: the shortest solution shares what they carry evenly
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal;
+  orthogonal.setThreshold(1e-12);
+  orthogonal.compute(matrix_);
+  return spread(orthogonal.solve(rhs));
+}
+
+StickSlipState StatusSystem::change(const VectorXd& rhs) const
+{
+  StickSlipState result = response(rhs - of_.N * particular_.w + of_.M * particular_.r);
+  result.r += particular_.r;
+  result.w += particular_.w;
+  return result;
+}
+
+int StatusSystem::index() const
+{
+  int forces = 0;
+  for (const PairSystem& pair : pairs_) forces += pair.forces;
+  const auto negative = (factors_.matrixLU().diagonal().array() < 0).count();
+  const double sign = factors_.permutationP().determinant() * ((forces + negative) % 2 == 0 ? 1 : -1);
+  return sign > 0 ? 1 : -1;
+}
+
+double StatusSystem::reciprocal_condition() const
+{
+  const VectorXd pivots = factors_.matrixLU().diagonal().cwiseAbs();
+  return pivots.size() == 0 ? 1 : pivots.minCoeff() / pivots.maxCoeff();
+}
+
+StickSlipSolution solve_stick_slip(const StickSlipOperator& of, const StickSlipFriction& friction, const VectorXd& q,
+                                   StickSlipState guess)
+{
+  constexpr int most = 60, patience = 15; // iterations in all, and without a smaller residual
+  StickSlipSolution best{guess, 0, std::numeric_limits<double>::infinity()};
+  StickSlipState at = std::move(guess);
+  int last_gain = 0;
+  for (int iteration = 0; iteration <= most && iteration - last_gain <= patience; ++iteration)
+  {
+    const double residual = std::max(stick_slip_residual(of, friction, at), imbalance(of, q, at));
+    if (residual < best.residual) best = {at, iteration, residual}, last_gain = iteration;
+    if (!std::isfinite(at.r.sum() + at.w.sum()) || residual <= tight) break;
+    const StatusSystem system(of, friction, at);
+    const StickSlipState change = system.change(q + of.M * at.r - of.N * at.w);
+    const double merit = sum_of_squares(of, friction, at);
+    double part = 1;
+    StickSlipState next{at.r + change.r, at.w + change.w};
+    for (int halving = 0; halving < 6 && !(sum_of_squares(of, friction, next) < merit * (1 - 1e-4 * part)); ++halving)
+    {
+      part /= 2;
+      next = {at.r + part * change.r, at.w + part * change.w};
+    }
+    if (!(sum_of_squares(of, friction, next) < merit)) next = {at.r + change.r, at.w + change.w}; // statuses change
+    at = std::move(next);
+  }
+  best.converged = best.residual <= good;
+  return best;
+}
+
+} // namespace squeal

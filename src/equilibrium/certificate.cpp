@@ -1,0 +1,95 @@
+#include "squeal/equilibrium/path_walk.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <Eigen/Dense>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Forces that span each pair's cone, columns over its rows. A disc becomes the polygon drawn round it, so that what no
+/// sum of them balances, no friction does.
+MatrixXd generators(const PathProblem& problem, const StickSlipFriction& friction)
+{
+  constexpr int sides = 16;
+  const int directions = problem.of.directions;
+  const PairRows<Index> rows(directions);
+  std::vector<VectorXd> columns;
+  const auto add = [&](std::size_t pair, double first, double second)
+  {
+    VectorXd& column = columns.emplace_back(VectorXd::Zero(problem.of.M.rows()));
+    const Index normal = rows.normal(static_cast<Index>(pair));
+    column[normal] = 1;
+    column[normal + 1] = friction.mu[pair] * first;
+    if (directions > 1) column[normal + 2] = friction.mu[pair] * second;
+  };
+  const TangentView<const double> e(friction.e, directions);
+  for (std::size_t pair = 0; pair < friction.mu.size(); ++pair)
+    if (length(e.of(pair)) > 0)
+      add(pair, e.of(pair)[0], directions > 1 ? e.of(pair)[1] : 0);
+    else if (directions == 1)
+      add(pair, 1, 0), add(pair, -1, 0);
+    else
+      for (int side = 0; side < sides; ++side)
+        add(pair, std::cos(2 * M_PI * side / sides) / std::cos(M_PI / sides),
+            std::sin(2 * M_PI * side / sides) / std::cos(M_PI / sides));
+  MatrixXd result(problem.of.M.rows(), static_cast<Index>(columns.size()));
+  for (Index i = 0; i < result.cols(); ++i) result.col(i) = columns[static_cast<std::size_t>(i)];
+  return result;
+}
+
+/// A x - b at the x >= 0 that makes it smallest (Lawson and Hanson 1974, algorithm NNLS).
+VectorXd least_rest(const MatrixXd& A, const VectorXd& b)
+{
+  std::vector<Index> passive;
+  VectorXd x = VectorXd::Zero(A.cols()), rest = -b;
+  const double enough = 1e-12 * b.norm() * A.colwise().norm().maxCoeff();
+  for (Index iteration = 0; iteration < 3 * A.cols(); ++iteration)
+  {
+    VectorXd gain = -A.transpose() * rest;
+    for (const Index i : passive) gain[i] = 0;
+    Index entering = 0;
+    if (!(gain.maxCoeff(&entering) > enough)) break;
+    passive.push_back(entering);
+    for (bool feasible = false; !feasible && !passive.empty();)
+    {
+      const VectorXd free = A(Eigen::all, passive).colPivHouseholderQr().solve(b);
+      double part = 1;
+      for (std::size_t k = 0; k < passive.size(); ++k)
+        if (const double to = free[static_cast<Index>(k)], from = x[passive[k]]; to <= 0)
+          part = std::min(part, from / (from - to));
+      for (std::size_t k = 0; k < passive.size(); ++k)
+        x[passive[k]] += part * (free[static_cast<Index>(k)] - x[passive[k]]);
+      feasible = part == 1;
+      std::erase_if(passive, [&](Index i) { return !(x[i] > 1e-15 * x.maxCoeff()); });
+    }
+    rest = A * x - b;
+  }
+  return rest;
+}
+
+} // namespace
+
+std::optional<VectorXd> unresisted_motion(const PathProblem& problem, const StickSlipFriction& friction,
+                                          const VectorXd& q)
+{
+  // rows that move without strain, N b = 0: what drives them by the load, kappa b'q, has to be balanced by b'r
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum(problem.of.N);
+  const Index free = (spectrum.eigenvalues().array().abs() < 1e-9).count();
+  if (free == 0) return std::nullopt;
+  const MatrixXd rigid = spectrum.eigenvectors().leftCols(free);
+  const VectorXd drive = -problem.kappa * (rigid.transpose() * q);
+  if (drive.norm() <= 1e-12 * problem.kappa * q.norm()) return std::nullopt;
+  const VectorXd rest = least_rest(rigid.transpose() * generators(problem, friction), drive);
+  if (rest.norm() <= 1e-9 * drive.norm()) return std::nullopt;
+  return rigid * rest;
+}
+
+} // namespace squeal

@@ -1,0 +1,174 @@
+// ranks: 1 2 3
+// Contacts without a drive in time, at rest and in modes, against exact answers.
+#include "../support/linearised.hpp"
+#include "squeal/transient/theta_step.hpp"
+
+#include <cmath>
+#include <doctest/doctest.h>
+
+using namespace squeal;
+using test::Rows;
+using test::SmallModel;
+
+namespace
+{
+
+/// A block that a load of 100 N presses onto the ground, on which it rubs with mu = 0.5, held by springs: motions of
+/// the block x, of the rubbing foot x, of the foot y. A stiff joint, or a spring k_t, leads from the block to the foot.
+SmallModel rubbing_block(double k0, double kt)
+{
+  SmallModel model;
+  const Rows M = test::diagonal({1, 0, 1});
+  const Rows K = {{k0 + kt, -kt, 0}, {-kt, kt, 0}, {0, 0, 0}};
+  model.structure = test::make_structure(M, test::zeros(3, 3), K, {0, 0, -100});
+  model.interface = test::make_interface({{0, 0, 1}, {0, 1, 0}}, 1, {0}, {0}, 0.5, model.structure.K);
+  return model;
+}
+
+/// The same without a spring between them.
+SmallModel sliding_block(double k)
+{
+  SmallModel model;
+  model.structure = test::make_structure(test::diagonal({1, 1}), test::zeros(2, 2), test::diagonal({k, 0}), {0, -100});
+  model.interface = test::make_interface({{0, 1}, {1, 0}}, 1, {0}, {0}, 0.5, model.structure.K);
+  return model;
+}
+
+/// The turning points of a motion's first entry over so many steps, and the work of the pairs without a drive.
+struct Turns
+{
+  std::vector<double> at;
+  double end = 0, work = 0, energy_lost = 0;
+};
+
+Turns turns_of(const SmallModel& model, const std::vector<double>& start, double h, int steps)
+{
+  const ThetaStep step = make_theta_step(model.structure, model.interface, h, 0.5, {});
+  State state{test::vector_like(model.structure.K, start), zeros_like(model.structure.load), 0, {}};
+  StepWork work = begin_steps(step, model.structure, model.interface, state);
+  const double energy = work.energy;
+  Turns turns;
+  std::array<double, 3> x{start[0], start[0], start[0]}; // of the last steps, latest first
+  for (int i = 0; i < steps; ++i)
+  {
+    const StepReport report = advance(step, model.structure, model.interface, work, state);
+    CHECK(report.contact_converged);
+    CHECK(std::abs(report.energy_defect) < 1e-10 * energy);
+    turns.work += report.joint_work.at(0);
+    x = {all_entries(state.u)[0], x[0], x[1]};
+    const double before = x[1] - x[2], after = x[0] - x[1];
+    if (i > 0 && before * after < 0) // the top of the parabola through three steps
+      turns.at.push_back(x[1] - std::pow(x[0] - x[2], 2) / (8 * (x[0] - 2 * x[1] + x[2])));
+  }
+  turns.end = x[0];
+  turns.energy_lost = energy - work.energy;
+  return turns;
+}
+
+/// A pad between the disc it rubs on and the abutment that holds it: motions pad x, y, disc y, bracket x.
+SmallModel pad_in_abutment(double force)
+{
+  SmallModel model;
+  const Rows K = test::diagonal({0, 0, 5e7, 3e7});
+  model.structure =
+      test::make_structure(test::diagonal({1, 1, 1, 1}), test::diagonal({2e3, 2e3, 2e3, 2e3}), K, {0, -force, 0, 0});
+  model.interface = test::make_interface({{0, 1, -1, 0}, {1, 0, 0, 0}, {-1, 0, 0, 1}, {0, 1, 0, 0}}, 1, {0, 0}, {1, 0},
+                                         0.4, model.structure.K);
+  return model;
+}
+
+} // namespace
+
+TEST_CASE("a block on a rough plane swings a tenth less each half period, and rests")
+{
+  const double T = 2 * M_PI / std::sqrt(1000.);
+  const Turns turns = turns_of(sliding_block(1000), {0.85, 0}, T / 200, 1000);
+  REQUIRE(turns.at.size() >= 7);
+  for (std::size_t i = 0; i < 7; ++i)
+    CHECK(std::abs(turns.at[i]) == doctest::Approx(0.75 - 0.1 * static_cast<double>(i)).epsilon(4e-4));
+  CHECK(turns.end == doctest::Approx(0.05).epsilon(1e-2));
+  CHECK(turns.work < 0);
+}
+
+TEST_CASE("a spring with a friction element decays as the exact solution")
+{
+  const std::vector<double> exact = {-.293422, .209590, -.156682, .133569, -.126882, .125384};
+  const double T = 2 * M_PI / std::sqrt(1000.);
+  const Turns turns = turns_of(rubbing_block(600, 400), {0.4, 0.4 - 50. / 400, 0}, T / 200, 800);
+  REQUIRE(turns.at.size() >= exact.size());
+  for (std::size_t i = 0; i < exact.size(); ++i) CHECK(std::abs(turns.at[i] - exact[i]) < 2e-4 * 0.4);
+}
+
+TEST_CASE("a load that rises slowly in time comes to the equilibrium of the path, which locks friction in")
+{
+  const double force = 1000, exact = force / 1.16;
+  const SmallModel model = pad_in_abutment(force);
+  const Equilibrium rest = find_equilibrium(model.structure, model.interface, {});
+  CHECK(rest.outcome.kind == OutcomeKind::converged);
+  CHECK(rest.reactions[0] == doctest::Approx(exact).epsilon(1e-10));
+  REQUIRE(rest.history);
+  CHECK(rest.force_residual < 1e-12);
+
+  const double h = 1e-4;
+  const int steps = 4000;
+  const ThetaStep step = make_theta_step(model.structure, model.interface, h, 0.5, {});
+  State state{zeros_like(model.structure.load), zeros_like(model.structure.load), 0, {}};
+  StepWork work = begin_steps(step, model.structure, model.interface, state);
+  for (int i = 0; i < 5 * steps / 4; ++i)
+  {
+    StepFactors factors;
+    factors.load = std::min(1., (i + 0.5) / steps);
+    (void)advance(step, model.structure, model.interface, factors, std::span(&work, 1), std::span(&state, 1));
+  }
+  CHECK(state.reactions[0] == doctest::Approx(exact).epsilon(5e-3));
+}
+
+TEST_CASE("locked-in friction stays as it is: a start at rest does not move, and nothing drifts")
+{
+  SmallModel model = pad_in_abutment(1000);
+  const auto half = copy_of(model.structure.load.get());
+  check(VecScale(half, 0.73));
+  model.structure.path.push_back({"press", copy_of(model.structure.load.get()), 1});
+  model.structure.path.push_back({"release", copy_of(half.get()), 1});
+  model.structure.load = copy_of(half.get());
+  const Equilibrium rest = find_equilibrium(model.structure, model.interface, {});
+  CHECK(rest.outcome.kind == OutcomeKind::converged);
+  CHECK(rest.reactions[0] == doctest::Approx(1000 / 1.16).epsilon(1e-10));
+  CHECK(rest.history->stick == 1);
+  const ThetaStep step = make_theta_step(model.structure, model.interface, 1e-4, 0.5, {});
+  State state{copy_of(rest.u.get()), zeros_like(rest.u), 0, rest.reactions};
+  StepWork work = begin_steps(step, model.structure, model.interface, state);
+  for (int i = 0; i < 1000; ++i) (void)advance(step, model.structure, model.interface, work, state);
+  double moved = 0, size = 0;
+  check(VecNorm(rest.u, NORM_INFINITY, &size));
+  check(VecAXPY(state.u, -1, rest.u));
+  check(VecNorm(state.u, NORM_INFINITY, &moved));
+  CHECK(moved < 1e-9 * size);
+}
+
+TEST_CASE("modes take a pair without a drive as held in all its motions")
+{
+  // two masses of two motions each, joined by springs; the first stands on the ground
+  const double a = 3e4, b = 1e4;
+  const Rows K = {{a + 2e4, 1e3, -a, 0}, {1e3, b + 1e4, 0, -b}, {-a, 0, a + 5e3, 2e3}, {0, -b, 2e3, b + 7e3}};
+  SmallModel model;
+  model.structure = test::make_structure(test::diagonal({1, 1, 2, 2}), test::zeros(4, 4), K, {0, -100, 0, -10});
+  model.interface = test::make_interface({{0, 1, 0, 0}, {1, 0, 0, 0}}, 1, {0}, {0}, 0.5, model.structure.K);
+  SmallModel held;
+  held.structure =
+      test::make_structure(test::diagonal({2, 2}), test::zeros(2, 2), {{a + 5e3, 2e3}, {2e3, b + 7e3}}, {0, 0});
+  held.interface = test::make_interface({}, 1, {}, {}, 0, held.structure.K);
+  const auto eigenvalues_of = [](const SmallModel& of)
+  {
+    ModesSettings settings;
+    settings.band = 1000;
+    const Modes modes = test::modes_of(of, find_equilibrium(of.structure, of.interface, {}), settings, {});
+    std::vector<double> found;
+    for (const ComplexMode& mode : modes.modes) found.push_back(std::abs(mode.lambda.imag()));
+    return found;
+  };
+  const std::vector<double> stuck = eigenvalues_of(model), exact = eigenvalues_of(held);
+  REQUIRE(stuck.size() == 2);
+  REQUIRE(exact.size() == 2);
+  for (std::size_t i = 0; i < 2; ++i) CHECK(stuck[i] == doctest::Approx(exact[i]).epsilon(1e-9));
+}
