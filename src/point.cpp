@@ -1,6 +1,6 @@
 #include "squeal/point.hpp"
 
-#include "squeal/mesh/names.hpp"
+#include "squeal/mesh/mesh.hpp"
 #include "squeal/modes/modes_checkpoint.hpp"
 
 namespace squeal
