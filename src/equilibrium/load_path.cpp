@@ -3,7 +3,6 @@
 #include "balance.hpp"
 #include "squeal/algebra/lent_cores.hpp"
 #include "squeal/base/broadcast.hpp"
-#include "squeal/base/petsc.hpp"
 
 #include <algorithm>
 #include <cmath>
