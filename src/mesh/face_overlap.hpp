@@ -20,8 +20,8 @@ std::span<const std::array<int, 2>> side_ends(FaceShape shape);
 struct PlacedFace
 {
   FaceShape shape{};
-  NodePositions x;        // [m]
-  Eigen::Vector3d normal; // [-] outward, mean over the face
+  NodePositions x;                                  // [m]
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero(); // [-] outward, mean over the face
   double slack = 0;       // [m] how far the face may stand off the curved surface for which it stands
   bool two_sided = false; // a shell's
 };
