@@ -82,7 +82,9 @@ void build_model(ReducedSearch& search, double amplitude)
   const bool sliding =
       search.fidelity.asked != CycleModel::reduced &&
       pairs_that_may_turn(problem.sliding.interface, problem.unstable.modes.front(), amplitude).empty();
-  search.model = {}; // before the next one takes memory
+  {
+    const ReducedModel released = std::move(search.model); // before the next one takes memory
+  }
   search.model = reduce(problem.sliding, problem.modes, search.active,
                         {search.options.reduced_modes, new_attachment, 0, sliding, &search.real, problem.step.factor});
   search.energy = energy_matrices(search.model);
