@@ -18,7 +18,7 @@ namespace
 {
 
 constexpr double first_part = 0.03, smaller = 0.1; // of the fluctuation, of the part before
-constexpr int motions = 3;
+constexpr int most_motions = 3;
 
 /// The slope of a line through all but the first quarter of the logarithms, and twice its standard error. Neighbours
 /// are correlated: eight values in a row count as one.
@@ -133,7 +133,7 @@ std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceL
   if (!floquet.fastest.real.get() || floquet.multipliers.values.empty()) return seen;
   const double largest = std::abs(floquet.multipliers.values.front()), bar = floquet.multipliers.errors.front();
   double part = first_part, highest = 1. / 3;
-  for (int k = 0; k < motions; ++k)
+  for (int k = 0; k < most_motions; ++k)
   {
     // the square of the shift in time is to the distance as the distance is to the fluctuation
     const BesideMotion motion{part, std::max(part * part / 0.3, 10 * orbit.residual), highest, periods};
