@@ -19,7 +19,7 @@ namespace
 using Complex = std::complex<double>;
 using Eigen::Index;
 
-constexpr double tolerance = 1e-6; // backward error of both vectors; eigenvalues are off by 1e-4 of themselves, at most
+constexpr double vector_tolerance = 1e-6; // backward error of both vectors; eigenvalues are off by 1e-4 of themselves, at most
 constexpr double least_share = 0.1;  // of a reference mode in an unstable one, below which it is none of them
 constexpr std::size_t prepared = 16; // samples whose closed pairs tell those of the basis
 
@@ -183,7 +183,7 @@ private:
   PointModes modes_at(const SweptPlace& place)
   {
     need(model_.equilibrium_at(place).outcome);
-    PointModes modes = model_.modes_at(place, tolerance);
+    PointModes modes = model_.modes_at(place, vector_tolerance);
     need(modes.outcome);
     std::erase_if(modes.pairs, [&](const TwoSidedPair& pair) { return !in_band(pair, problem_.modes.band); });
     return modes;
@@ -258,7 +258,7 @@ template <class Work> SampleFailure for_own(int count, MPI_Comm comm, Progress& 
 
 Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
 {
-  const OneThread alone; // points are many dense problems of a few hundred rows
+  const Finally alone = one_thread(); // points are many dense problems of a few hundred rows
   Robustness result;
   for (std::vector<double>& values : random_values(problem, comm)) result.samples.push_back({std::move(values)});
   for (int k = 0; k < problem.settings.checks; ++k) result.checks.push_back({k});
