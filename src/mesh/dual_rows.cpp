@@ -238,7 +238,7 @@ ContactSurface contact_surface(const Mesh& mesh, const std::string& name, const 
   {
     std::vector<Vec3> x;
     for (const int node : nodes_of(face)) x.push_back(mesh.nodes[node]);
-    surface.placed.push_back({face.shape, position_matrix(x), {}, 0, face.of_shell});
+    surface.placed.push_back({.shape = face.shape, .x = position_matrix(x), .two_sided = face.of_shell});
   }
   set_normals(surface, set_patches(surface));
   std::vector<Vec3> places;
