@@ -340,14 +340,18 @@ int steps_to_compare(const Structure& structure, int steps)
   return is_dear(steps * work_of_step(structure)) && steps <= enough_steps ? 2 * steps : 0;
 }
 
+int steps_of_verdict(const Structure& structure, int steps)
+{
+  return is_dear(steps * work_of_step(structure)) ? std::min(steps, enough_steps) : steps;
+}
+
 Verdict examine(const CycleProblem& problem, const CycleOptions& options, const LimitCycle& cycle)
 {
-  const int steps = cycle.steps_per_period;
-  PeriodMap map{problem.sliding, problem.step, std::min(steps, enough_steps), cycle.theta};
+  const int steps = cycle.steps_per_period, judged = steps_of_verdict(problem.sliding.structure, steps);
+  PeriodMap map{problem.sliding, problem.step, judged, cycle.theta};
   map.reactions = problem.sliding.equilibrium.reactions;
   Flow flow = flow_of(map);
-  add_slow_motions(problem, map, steps > enough_steps ? steps : steps_to_compare(problem.sliding.structure, steps),
-                   flow);
+  add_slow_motions(problem, map, steps > judged ? steps : steps_to_compare(problem.sliding.structure, steps), flow);
   const Orbit& orbit = cycle.orbit;
   const Preconditioner none;
   const OrbitProblem found = problem_of(flow, none, {problem.sliding.equilibrium.u, nullptr, nullptr, orbit.period},

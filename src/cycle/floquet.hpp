@@ -19,6 +19,10 @@ Preconditioner recorded_preconditioner(const CycleProblem& problem, const Period
 /// verdict at finer steps follows, else 0. Collective.
 int steps_to_compare(const Structure& structure, int steps);
 
+/// The number of steps a period at which an orbit is judged: its own, or enough_steps where as many are dear.
+/// Collective.
+int steps_of_verdict(const Structure& structure, int steps);
+
 /// The verdict on a converged cycle, by at most 128 steps a period: what the others change is in the bars.
 Verdict examine(const CycleProblem& problem, const CycleOptions& options, const LimitCycle& cycle);
 

@@ -281,8 +281,9 @@ FittedCycle refine_steps(const CycleCorrection& correction, FittedCycle found)
     fidelity.reason = format("the run was ended at %d steps a period", cycle.steps_per_period);
   }
   // impacts may make a cycle repel that attracts at few steps; where that costs too much, the bars at few hold it
-  const double of_period = std::min(cycle.steps_per_period, enough_steps) * work_of_step(problem.sliding.structure);
-  if (cycle.cut_short || is_dear(of_period)) return found;
+  const Structure& structure = problem.sliding.structure;
+  const int judged = steps_of_verdict(structure, cycle.steps_per_period);
+  if (cycle.cut_short || is_dear(judged * work_of_step(structure))) return found;
   Verdict verdict = examine(problem, correction.options, cycle);
   if (verdict.cut_short)
   {
@@ -292,7 +293,7 @@ FittedCycle refine_steps(const CycleCorrection& correction, FittedCycle found)
   }
   refuse_repelling(verdict, problem.unstable.modes.size() - 1, cycle.outcome);
   cycle.multipliers = std::move(verdict.floquet.multipliers);
-  fidelity.verdict_steps = std::min(cycle.steps_per_period, enough_steps);
+  fidelity.verdict_steps = judged;
   return found;
 }
 
