@@ -53,7 +53,7 @@ double difference(const Vector& a, const Vector& b)
 
 double true_residual(const Vector& W, const Vector& b, const Vector& r)
 {
-  return contact_residual(make_contact_operator(W, pairs, 2), {0.4}, b, r);
+  return contact_residual(make_contact_operator(W, pairs, 2), FrictionLaw{0.4}, b, r);
 }
 
 } // namespace

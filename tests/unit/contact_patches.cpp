@@ -109,7 +109,7 @@ TEST_CASE("ranks sweep over a single large patch by pieces, to the answer of one
     CHECK(result.converged);
     CHECK_FALSE(result.as_one);
     CHECK(result.iterations <= 1.2 * of_one.iterations); // slices far apart act on each other by less than rounding
-    CHECK(contact_residual(alone, {0.4}, b, together) < 1.01e-10);
+    CHECK(contact_residual(alone, FrictionLaw{0.4}, b, together) < 1.01e-10);
     // a residual of 1e-10 of the largest reaction, and cond(W) = 1.1/0.9 (1 + e^-0.5)^2/(1 - e^-0.5)^2 < 21
     CHECK(difference(together, exact) < 1e-8 * *std::max_element(exact.begin(), exact.end()));
     CHECK(std::count(exact.begin(), exact.end(), 0.) > 100); // some pairs are open
@@ -127,7 +127,7 @@ TEST_CASE("a large patch whose pieces would push each other as strongly as thems
   const Vector b = velocity_of_line(1);
   Vector r;
   CHECK(solve_contact(W, b, {0.3}, {}, r).converged);
-  CHECK(contact_residual(make_contact_operator(dense, large, 1), {0.3}, b, r) < 1.01e-10);
+  CHECK(contact_residual(make_contact_operator(dense, large, 1), FrictionLaw{0.3}, b, r) < 1.01e-10);
 }
 
 TEST_CASE("ranks sweep over patches side by side, to the answer of one rank")
@@ -152,7 +152,7 @@ TEST_CASE("ranks sweep over patches side by side, to the answer of one rank")
                           of_one = solve_contact(alone, b, {0.4}, {}, exact);
       CHECK(result.converged);
       CHECK(result.iterations == of_one.iterations);
-      CHECK(contact_residual(alone, {0.4}, b, together) < 1.01e-10);
+      CHECK(contact_residual(alone, FrictionLaw{0.4}, b, together) < 1.01e-10);
       CHECK(difference(together, exact) < 1e-12 * *std::max_element(exact.begin(), exact.end()));
       CHECK(std::count(exact.begin(), exact.end(), 0.) > 30); // some pairs are open
     }
@@ -185,7 +185,7 @@ TEST_CASE("where patches act on each other by more than their blocks say, all pa
   CHECK(result.converged);
   CHECK(result.iterations > 100); // patch by patch, in vain
   CHECK(result.as_one);
-  CHECK(contact_residual(make_contact_operator(dense, pairs, 2), {0.3}, b, r) < 1.01e-10);
+  CHECK(contact_residual(make_contact_operator(dense, pairs, 2), FrictionLaw{0.3}, b, r) < 1.01e-10);
   ContactSettings settings;
   settings.max_iterations = 3;
   CHECK(solve_contact(W, b, {0.3}, settings, r = {}).iterations == 3);

@@ -182,7 +182,7 @@ TEST_CASE("Gauss-Seidel and the projection fixed point find the same reactions")
       CHECK(first.residual <= 1e-12);
       // the residual bounds the error up to the condition of W, which is below 100 here
       CHECK(difference(swept, projected) < 1e-9);
-      CHECK(contact_residual(op, {mu}, b, swept) <= 1e-12);
+      CHECK(contact_residual(op, FrictionLaw{mu}, b, swept) <= 1e-12);
     }
 }
 
@@ -199,7 +199,7 @@ TEST_CASE("a converged answer satisfies the residual when w is formed afresh, or
     const ContactOperator op = make_contact_operator(W, pairs, directions);
     Vector r;
     const auto result = solve_contact(op, b, {mu}, {ContactSolver::gauss_seidel, 1e-10, 2000, 0}, r);
-    const double truth = contact_residual(op, {mu}, b, r);
+    const double truth = contact_residual(op, FrictionLaw{mu}, b, r);
     CHECK(result.converged == (result.residual <= 1e-10));
     if (result.converged) CHECK(truth < 2e-10); // another order of summation
     solved += result.converged ? 1 : 0;
