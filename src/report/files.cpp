@@ -118,7 +118,7 @@ void Hdf5File::write_data(const DataSet& described, const std::string& name, con
 
 void Hdf5File::write_columns(const std::string& group, const Result& list)
 {
-  for (const auto& [first, data_set, cells] : columns_of(list))
+  for (const auto& [name, first, data_set, cells] : columns_of(list))
   {
     if (data_set.empty()) continue;
     std::vector<double> reals;

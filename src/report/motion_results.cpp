@@ -295,17 +295,19 @@ void add_fidelity(Entry whole, const Fidelity& fidelity)
   out.text("reason", "why that model was used", fidelity.reason);
   if (!out.has(is_chosen)) return;
   out.show("accuracy", "-", "the scene's `accuracy`", fidelity.accuracy);
-  out.show("size", "-", "shapes of the reduced model", fidelity.size);
-  out.show("modes", "-", "shapes of modes among them", fidelity.modes);
-  out.show("attachment_shapes", "-", "attachment shapes among them", fidelity.attachment_shapes);
+  const Entry reduced = fidelity.used == CycleModel::reduced ? out : out.hidden();
+  reduced.show("size", "-", "shapes of the reduced model", fidelity.size);
+  reduced.show("modes", "-", "shapes of modes among them", fidelity.modes);
+  reduced.show("attachment_shapes", "-", "attachment shapes among them", fidelity.attachment_shapes);
   out.add("left_out_shapes", "-", "attachment shapes that the free memory leaves out", fidelity.left_out_shapes);
   out.add("lost_compliance", "-", "mean part of the active pairs' compliance in those", fidelity.lost_compliance);
-  out.show("active_pairs", "-", "pairs with unilateral contact and friction in it", fidelity.active_pairs);
-  out.show("sliding_pairs", "-", "pairs taken to stay closed and sliding; the rest stay open", fidelity.sliding_pairs);
+  reduced.show("active_pairs", "-", "pairs with unilateral contact and friction in it", fidelity.active_pairs);
+  reduced.show("sliding_pairs", "-", "pairs taken to stay closed and sliding; the rest stay open",
+               fidelity.sliding_pairs);
   out.add("steps_per_period", "-", "time steps a period that were chosen", fidelity.steps_per_period);
   out.show("verdict_steps", "-", "time steps a period at which the verdict was given", fidelity.verdict_steps);
   out.add("contact_tolerance", "-", "contact tolerance that was chosen", fidelity.contact_tolerance);
-  out.show("reduced_periods", "-", "periods of the reduced model integrated", fidelity.reduced_periods);
+  reduced.show("reduced_periods", "-", "periods of the reduced model integrated", fidelity.reduced_periods);
   out.show("full_periods", "-", "periods of the full model integrated", fidelity.full_periods);
   const Entry errors = out.group("error_estimates");
   errors.show("frequency", "-", "relative error of the frequency by the model", fidelity.frequency_error);

@@ -11,22 +11,20 @@ namespace squeal
 namespace
 {
 
-/// Whether two results are described alike, so that their values make a column.
-bool is_same_result(const Result& a, const Result& b)
-{
-  return a.name == b.name && std::string_view(a.meaning) == b.meaning;
-}
-
-void add_cells(const Result& group, const std::string& place, std::size_t row, std::vector<Column>& columns)
+/// Adds the values of a group, which is in groups of the names `place` and `data_place`, to the columns that they
+/// belong to.
+void add_cells(const Result& group, const std::string& place, const std::string& data_place, std::size_t row,
+               std::vector<Column>& columns)
 {
   for (const Result& part : group.parts)
   {
+    const std::string name = place + part.name;
     if (part.kind == Result::Kind::group)
-      add_cells(part, part.data_set.empty() ? place : place + part.data_set + "/", row, columns);
+      add_cells(part, name + " ", part.data_set.empty() ? data_place : data_place + part.data_set + "/", row, columns);
     if (part.kind != Result::Kind::value) continue;
-    auto column = std::ranges::find_if(columns, [&](const Column& one) { return is_same_result(*one.first, part); });
+    auto column = std::ranges::find(columns, name, &Column::name);
     if (column == columns.end())
-      column = columns.insert(column, {&part, part.data_set.empty() ? "" : place + part.data_set, {}});
+      column = columns.insert(column, {name, &part, part.data_set.empty() ? "" : data_place + part.data_set, {}});
     column->cells.resize(row);
     column->cells.push_back(&part);
   }
@@ -144,7 +142,7 @@ Json json_of(const Result& result)
 std::vector<Column> columns_of(const Result& list)
 {
   std::vector<Column> columns;
-  for (std::size_t row = 0; const Result& group : list.parts) add_cells(group, "", row++, columns);
+  for (std::size_t row = 0; const Result& group : list.parts) add_cells(group, "", "", row++, columns);
   for (Column& column : columns) column.cells.resize(list.parts.size());
   return columns;
 }
@@ -181,7 +179,7 @@ std::string page_rows(const Result& result)
 std::string page_rows_of_columns(const Result& list, const std::string& group)
 {
   std::string rows;
-  for (const auto& [first, data_set, cells] : columns_of(list))
+  for (const auto& [name, first, data_set, cells] : columns_of(list))
     if (!data_set.empty())
       rows += markdown_row({markdown_code(group + "/" + data_set), column_unit(*first), first->meaning});
   return rows;

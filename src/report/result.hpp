@@ -138,6 +138,7 @@ Json json_of(const Result& result);
 /// One value of every group of a list; null where a group lacks it.
 struct Column
 {
+  std::string name; // behind the names of the groups that it stands in
   const Result* first = nullptr;
   std::string data_set; // with the groups that it stands in
   std::vector<const Result*> cells;

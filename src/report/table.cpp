@@ -25,7 +25,8 @@ std::string stage_row(const std::string& head, const std::string& text)
 /// A name in words, without its unit.
 std::string label(const std::string& name)
 {
-  std::string text = name.ends_with("_hz") ? name.substr(0, name.size() - 3) : name;
+  std::string text = name;
+  if (const std::size_t at = text.find("_hz"); at != std::string::npos) text.erase(at, 3);
   std::ranges::replace(text, '_', ' ');
   return text;
 }
@@ -89,9 +90,10 @@ std::string columns_text(const Result& list)
     const Result& first = *column.first;
     if (first.place == Place::none) continue;
     const std::string unit = unit_text(first);
-    std::vector<std::string> cells = {label(first.name), unit.empty() ? "" : "[" + unit + "]"};
+    std::vector<std::string> cells = {label(column.name), unit.empty() ? "" : "[" + unit + "]"};
     for (const std::size_t i : places)
       cells.push_back(column.cells[i] ? value_text(column.cells[i]->value, first) : "");
+    if (std::all_of(cells.begin() + 2, cells.end(), [](const std::string& cell) { return cell.empty(); })) continue;
     std::size_t width = 0;
     for (const std::string& cell : cells) width = std::max(width, cell.size());
     const bool is_text = first.unit == "text" || first.unit == "word";
@@ -178,7 +180,7 @@ std::string timings_text(const Report& report)
   std::string text = stage_row("time", "");
   for (const auto& [stage, seconds, processor_seconds] : report.timings)
   {
-    text += format("    %-*s %.2f s\n", name_width, word(stage), seconds);
+    if (seconds >= 0.01) text += format("    %-*s %.2f s\n", name_width, word(stage), seconds);
     total += seconds;
   }
   return text + format("    %-*s %.2f s\n", name_width, "in all", total);
