@@ -35,6 +35,8 @@ const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
   try
   {
     go_to(place);
+    if (problem_.settings.stages >= SweepStages::modes && has_undriven_pairs(model_->interface))
+      throw Error("a pair is driven by nothing there, and sweeps of modes do not know such pairs");
     equilibrium = searched_.at(model_->structure, model_->interface);
   }
   catch (const LibraryError&)
