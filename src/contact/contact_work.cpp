@@ -1,5 +1,7 @@
 #include "contact_work.hpp"
 
+#include "squeal/base/broadcast.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -43,6 +45,14 @@ void form_products(std::span<ContactWork* const> works)
     ++work->reads;
   }
   works.front()->W.multiply(r, Wr);
+}
+
+PairFriction announced_friction(PairFriction friction, MPI_Comm comm)
+{
+  MPI_Bcast(&friction.common, sizeof friction.common, MPI_BYTE, 0, comm);
+  broadcast(friction.own, comm);
+  broadcast(friction.number_of_own, comm);
+  return friction;
 }
 
 } // namespace squeal

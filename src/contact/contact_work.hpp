@@ -39,6 +39,9 @@ double defect_of(const ContactWork& work, std::size_t pair, const PairVector& w,
 /// The largest defect of all pairs.
 double residual_of(const ContactWork& work);
 
+/// Returns the laws that rank 0 gives. Collective.
+PairFriction announced_friction(PairFriction friction, MPI_Comm comm);
+
 /// W r of each, reading W once.
 void form_products(std::span<ContactWork* const> works);
 

@@ -9,7 +9,6 @@
 #include "gauss_seidel.hpp"
 
 #include "squeal/base/broadcast.hpp"
-#include "squeal/base/error.hpp"
 #include "swept_pairs.hpp"
 
 #include <algorithm>
@@ -343,15 +342,6 @@ struct Announced
   ContactSettings settings{};
 };
 static_assert(std::is_trivially_copyable_v<Announced>);
-
-/// The laws that rank 0 has.
-PairFriction announced_friction(PairFriction friction, MPI_Comm comm)
-{
-  MPI_Bcast(&friction.common, sizeof friction.common, MPI_BYTE, 0, comm);
-  broadcast(friction.own, comm);
-  broadcast(friction.number_of_own, comm);
-  return friction;
-}
 
 /// Exchanges the problems in one message: the speed, b, r and W r of each.
 void exchange(std::span<ContactWork* const> works, std::span<std::vector<double>> b, MPI_Comm comm)

@@ -48,7 +48,7 @@ void write_coordinates(Hdf5File& file, const SettledMotion& settled)
     for (const auto& coordinate : coordinates) rows.push_back(coordinate[i]);
   }
   file.write("settled/shapes/time", time);
-  file.write("settled/shapes/coordinate", rows);
+  file.write("settled/shapes/coordinate", rows, coordinates.size());
 }
 
 void write_statuses(Hdf5File& file, const std::vector<std::vector<ContactStatus>>& statuses)
@@ -57,7 +57,7 @@ void write_statuses(Hdf5File& file, const std::vector<std::vector<ContactStatus>
   std::vector<unsigned char> flat;
   for (const auto& step : statuses)
     for (const ContactStatus status : step) flat.push_back(static_cast<unsigned char>(status));
-  file.write("cycle/status", flat);
+  file.write("cycle/status", flat, statuses.front().size());
 }
 
 void write_response(Hdf5File& file, const Response& response, const Scene& scene)
