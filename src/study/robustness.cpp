@@ -19,7 +19,8 @@ namespace
 using Complex = std::complex<double>;
 using Eigen::Index;
 
-constexpr double vector_tolerance = 1e-6; // backward error of both vectors; eigenvalues are off by 1e-4 of themselves, at most
+constexpr double vector_tolerance =
+    1e-6; // backward error of both vectors; eigenvalues are off by 1e-4 of themselves, at most
 constexpr double least_share = 0.1;  // of a reference mode in an unstable one, below which it is none of them
 constexpr std::size_t prepared = 16; // samples whose closed pairs tell those of the basis
 

@@ -35,8 +35,6 @@ const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
   try
   {
     go_to(place);
-    if (problem_.settings.stages >= SweepStages::modes && has_undriven_pairs(model_->interface))
-      throw Error("a pair is driven by nothing there, and sweeps of modes do not know such pairs");
     equilibrium = searched_.at(model_->structure, model_->interface);
   }
   catch (const LibraryError&)
@@ -81,6 +79,7 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
   try
   {
     go_to(place);
+    if (equilibrium.history) throw Error("nothing drives a pair there, and sweeps of modes do not know such pairs");
     const std::vector<char>& rigid = rigid_at(place);
     std::vector<char> common = basis_ ? basis_->closed : at_every_;
     if (common.size() != rigid.size())
