@@ -152,8 +152,8 @@ def lift_off_of(run):
 def open_in_time(run):
     """Middle of each period [s], least and largest number of open pairs in it over that of all pairs."""
     transient = run.stage("transient")
-    window = max(1, round(run.followed_period() / transient["step_size"]))
     opened, time = run.series("transient", "open"), run.series("transient", "time")
+    window = max(1, round(run.followed_period() / transient["step_size"]))
     count = len(opened) // window
     if count < 2:
         raise Missing("the transient is shorter than two periods")
