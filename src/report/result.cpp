@@ -62,7 +62,7 @@ void add_page_rows(const Result& result, const std::string& place, std::string& 
     rows += markdown_row({markdown_code(name + (result.value.is_array() ? "[]" : "")), result.unit,
                           result.meaning + (result.words.empty() ? "" : ": " + words_text(result.words))});
   const bool is_list = result.kind == Result::Kind::list || result.kind == Result::Kind::curve;
-  for (const Result& part : result.parts) add_page_rows(part, name + (is_list && !name.empty() ? "[]" : ""), rows);
+  for (const Result& part : result.parts) add_page_rows(part, name + (is_list ? "[]" : ""), rows);
 }
 
 } // namespace
@@ -172,7 +172,7 @@ std::string column_unit(const Result& result)
 std::string page_rows(const Result& result)
 {
   std::string rows;
-  add_page_rows(result, "", rows);
+  for (const Result& part : result.parts) add_page_rows(part, "", rows);
   return rows;
 }
 

@@ -236,7 +236,7 @@ def test_words_of_outcomes_and_choices_are_explained():
     pages = "".join(page.read_text() for page in (ROOT / "README.md", GUIDE, KEYS, RESULTS, FILES))
     found = 0
     for file in [*(ROOT / "include").rglob("*.hpp"), *(ROOT / "src").rglob("*.[ch]pp")]:
-        for words in re.findall(r"std::array \w+_words\s*=\s*\{(.*?)\}", file.read_text(), re.S):
+        for words in re.findall(r"std::array words_of<\w+>\s*=\s*\{(.*?)\}", file.read_text(), re.S):
             for word in re.findall(r'"([^"]+)"', words):
                 found += 1
                 # a start may be a file, which is named and not called "file"
