@@ -353,7 +353,6 @@ TEST_CASE("names that are doubled or not defined are refused")
 TEST_CASE("contradictions between keys are refused")
 {
   check_message(error_of(replaced(points, "normal = \"y\"\n", ""), {}), {"'normal'"});
-  check_message(error_of(replaced(points, "velocity = [1, 0, 0]\n", ""), {}), {"rotation or a velocity"});
   check_message(error_of(replaced(points, "stator = \"pad\"", "stator = \"disc\""), {}), {"both"});
   check_message(error_of(replaced(points, "normal = \"y\"", "normal = \"y\"\ntangents = \"y\""), {}), {"square"});
   check_message(error_of(replaced(brake, "rotation = {", "velocity = [1, 0, 0]\nrotation = {"), {}), {"exclude"});
