@@ -440,7 +440,7 @@ def test_an_interrupted_sweep_keeps_its_points_and_begins_again(ranks, divisions
             assert f"of {points} points" in ended["reason"]
             assert set(at) <= {p["values"][0] for p in whole.report["sweep"]["points"]}
             assert [p["inserted"] for p in ended["points"]].count(False) < points
-            assert {float(row["friction.coefficient"]) for row in rows_of(tmp_path / "in_two")} == set(at)
+            assert {float(row["friction.coefficient"]) for row in (rows_of(tmp_path / "in_two") if at else [])} == set(at)
     again = squeal(*ask, "--restart", ranks=ranks) if first.code == 3 else first
     assert whole.code == again.code == 0, again.errors
     one, two = whole.report["sweep"], json.loads((tmp_path / "in_two" / "report.json").read_text())["sweep"]
