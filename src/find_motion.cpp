@@ -29,7 +29,7 @@ struct PacedDivergence
   GivenStart start; // beside the equilibrium
 };
 
-/// What the motion had settled on at fewer steps a period.
+/// The motion that had settled at fewer steps a period.
 struct SettledBySteps
 {
   MotionKind kind = MotionKind::undecided;

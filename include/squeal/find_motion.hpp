@@ -7,7 +7,7 @@
 namespace squeal
 {
 
-/// What the scene starts the search from, if it is not the modes.
+/// The start that the scene gives the search, if it is not the modes.
 struct MotionStart
 {
   std::optional<GivenStart> given;

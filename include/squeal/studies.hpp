@@ -17,7 +17,7 @@ Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const
 BrakeBranch run_branch(const SlidingPoint& point, const Motion& motion, const Scene& scene,
                        const ProgramOptions& options);
 
-/// What changes of the scene do to the unstable modes.
+/// Derivatives of the unstable modes, and the effect of changes of the scene on them.
 Sensitivity run_sensitivity(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options);
 
 /// Modes over numbers of the scene and, where it asks for them, what is heard there.

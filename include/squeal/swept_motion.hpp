@@ -1,5 +1,5 @@
 #pragma once
-/// What is heard at a point of a sweep.
+/// The motion that is heard at a point of a sweep.
 #include "squeal/model.hpp"
 #include "squeal/options.hpp"
 

@@ -9,6 +9,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <numeric>
+#include <utility>
 
 namespace squeal
 {
@@ -25,7 +26,6 @@ using Eigen::VectorXd;
 
 enum class Vectors
 {
-  none,
   right,
   both
 };
@@ -34,7 +34,7 @@ enum class Vectors
 struct Eigenvectors
 {
   Eigen::VectorXcd mu;
-  Eigen::MatrixXcd left{}, right{}; // empty: not wanted
+  Eigen::MatrixXcd left{}, right{}; // without columns: left ones are not wanted
 };
 
 template <class Complexes> lapack_complex_double* entries_of(Complexes& A)
@@ -72,17 +72,10 @@ MatrixXcd complex_columns(const VectorXcd& mu, const MatrixXd& packed)
   return columns;
 }
 
-/// The letters and the columns that LAPACK's geev takes for left and right vectors.
-struct Wanted
+/// The letter that LAPACK's geev takes for left vectors, and their number.
+std::pair<char, Index> left_wanted(Vectors which, Index size)
 {
-  char left, right;
-  Index left_columns, right_columns;
-};
-
-Wanted wanted(Vectors which, Index size)
-{
-  const bool left = which == Vectors::both, right = which != Vectors::none;
-  return {left ? 'V' : 'N', right ? 'V' : 'N', left ? size : 0, right ? size : 0};
+  return which == Vectors::both ? std::pair('V', size) : std::pair('N', Index{0});
 }
 
 void need_convergence(int info)
@@ -90,14 +83,14 @@ void need_convergence(int info)
   if (info != 0) throw Error("the QR algorithm did not converge on a dense eigenproblem");
 }
 
-/// By LAPACK. Error: the QR algorithm does not converge.
+/// Finds them by LAPACK. Error: the QR algorithm does not converge.
 Eigenvectors eigenvectors(MatrixXd A, Vectors which)
 {
   const int size = to_int(A.rows());
-  const Wanted job = wanted(which, size);
+  const auto [wants_left, columns] = left_wanted(which, size);
   VectorXd re(size), im(size);
-  MatrixXd left(size, job.left_columns), right(size, job.right_columns);
-  need_convergence(LAPACKE_dgeev(LAPACK_COL_MAJOR, job.left, job.right, size, A.data(), size, re.data(), im.data(),
+  MatrixXd left(size, columns), right(size, size);
+  need_convergence(LAPACKE_dgeev(LAPACK_COL_MAJOR, wants_left, 'V', size, A.data(), size, re.data(), im.data(),
                                  left.data(), size, right.data(), size));
   const VectorXcd mu = re.cast<Complex>() + Complex(0, 1) * im;
   return {mu, complex_columns(mu, left), complex_columns(mu, right)};
@@ -106,9 +99,9 @@ Eigenvectors eigenvectors(MatrixXd A, Vectors which)
 Eigenvectors eigenvectors(MatrixXcd A, Vectors which)
 {
   const int size = to_int(A.rows());
-  const Wanted job = wanted(which, size);
-  Eigenvectors all{VectorXcd(size), MatrixXcd(size, job.left_columns), MatrixXcd(size, job.right_columns)};
-  need_convergence(LAPACKE_zgeev(LAPACK_COL_MAJOR, job.left, job.right, size, entries_of(A), size, entries_of(all.mu),
+  const auto [wants_left, columns] = left_wanted(which, size);
+  Eigenvectors all{VectorXcd(size), MatrixXcd(size, columns), MatrixXcd(size, size)};
+  need_convergence(LAPACKE_zgeev(LAPACK_COL_MAJOR, wants_left, 'V', size, entries_of(A), size, entries_of(all.mu),
                                  entries_of(all.left), size, entries_of(all.right), size));
   return all;
 }
@@ -176,7 +169,7 @@ template <class Matrix> std::vector<TwoSidedPair> solve_companion(const Matrix& 
     TwoSidedPair& pair = result.emplace_back();
     pair.lambda = omega * (shift + 1.0 / mu(j));
     // of mu y and y the one of larger entries
-    if (right.cols() > 0) pair.right = right.col(j).segment(std::abs(mu(j)) > 1 ? 0 : n, n).normalized();
+    pair.right = right.col(j).segment(std::abs(mu(j)) > 1 ? 0 : n, n).normalized();
     if (left.cols() > 0) pair.left = chi.col(place++).normalized();
   }
   return result;
@@ -300,25 +293,6 @@ SymmetricEigenpairs solve_dense_symmetric_shared(MPI_Comm comm, const MatrixXd& 
   broadcast(pairs.lambda, comm);
   broadcast(pairs.y, comm);
   return pairs;
-}
-
-std::vector<Complex> dense_quadratic_eigenvalues(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K)
-{
-  return values_of(right_pairs(solve_companion(M, C, K, Vectors::none, HUGE_VAL)));
-}
-
-TwoSidedPair two_sided_pair(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K, Complex lambda)
-{
-  const Complex near = lambda * (1 + 1e-10); // so that no pivot vanishes
-  const MatrixXcd Q = near * near * M + near * C + K;
-  const Eigen::PartialPivLU<MatrixXcd> factor(Q);
-  TwoSidedPair pair{lambda, VectorXcd::Ones(K.rows()), VectorXcd::Ones(K.rows())};
-  for (int iteration = 0; iteration < 3; ++iteration)
-  {
-    pair.right = factor.solve(pair.right).normalized();
-    pair.left = factor.transpose().solve(pair.left).normalized();
-  }
-  return pair;
 }
 
 std::vector<DenseEigenpair> solve_dense_unsymmetric(const MatrixXd& A)

@@ -44,7 +44,7 @@ SQUEAL_INLINE void add_columns(const double* W, std::size_t size, std::size_t j,
   }
 }
 
-/// The same of lanes, with `some` columns of W.
+/// Products of lanes with `some` columns of W.
 template <class Vector, std::size_t some> SQUEAL_INLINE void
 add_columns_of_lanes(const double* W, std::size_t size, std::size_t j, std::size_t lanes, const double* x, double* y)
 {

@@ -45,7 +45,7 @@ struct PairState
     return sticks ? ContactStatus::stick : ContactStatus::slip;
   }
 
-  /// What the law misses [N], r - proj(r - rho w) with the disc of the projected normal reaction.
+  /// The law's defect [N], r - proj(r - rho w) with the disc of the projected normal reaction.
   Vector3d defect() const
   {
     Vector3d result = r;
@@ -73,7 +73,7 @@ PairState pair_state(const StickSlipOperator& of, const StickSlipFriction& frict
           rounding * at.r.lpNorm<Eigen::Infinity>()};
 }
 
-/// What the defects of each contact's pairs are compared with [N]: its largest reaction, or a small part of all
+/// The forces that defects of each contact's pairs are compared with [N]: its largest reaction, or a small part of all
 /// contacts' and of what slips would take, where a contact is about to open.
 std::vector<double> scales_of(const StickSlipOperator& of, const StickSlipState& at)
 {

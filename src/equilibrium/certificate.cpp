@@ -1,3 +1,4 @@
+#include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/path_walk.hpp"
 
 #include <algorithm>
@@ -38,8 +39,10 @@ MatrixXd generators(const PathProblem& problem, const StickSlipFriction& frictio
       add(pair, 1, 0), add(pair, -1, 0);
     else
       for (int side = 0; side < sides; ++side)
-        add(pair, std::cos(2 * M_PI * side / sides) / std::cos(M_PI / sides),
-            std::sin(2 * M_PI * side / sides) / std::cos(M_PI / sides));
+      {
+        const double angle = two_pi * side / sides, corner = 1 / std::cos(two_pi / 2 / sides); // over the radius
+        add(pair, corner * std::cos(angle), corner * std::sin(angle));
+      }
   MatrixXd result(problem.of.M.rows(), static_cast<Index>(columns.size()));
   for (Index i = 0; i < result.cols(); ++i) result.col(i) = columns[static_cast<std::size_t>(i)];
   return result;

@@ -22,7 +22,7 @@ Held hold(const Structure& structure, const Interface& interface, const FactorOp
 /// bodies along their contacts, too. Error: a body that contact does not hold either (which one).
 Held hold_by_all_rows(const Structure& structure, const Interface& interface, const FactorOptions& options);
 
-/// What reactions do to gaps, pairs x pairs: D_nn of normal ones, D_nt of friction along the axes. On rank 0.
+/// The compliance of gaps to reactions, pairs x pairs: D_nn of normal ones, D_nt of friction along the axes. On rank 0.
 struct GapCompliance
 {
   Eigen::MatrixXd D_nn, D_nt;

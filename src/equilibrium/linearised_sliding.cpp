@@ -34,7 +34,7 @@ struct HeldRow
   PetscInt component; // 0: normal
 };
 
-// Of the closed pairs, those of driven pairs first: rows that these imply are left out.
+// Rows of closed pairs, of driven ones first: rows that these imply are left out.
 std::vector<HeldRow> held_rows(const Interface& interface, const std::vector<char>& closed)
 {
   std::vector<HeldRow> sliding, sticking;
@@ -50,7 +50,7 @@ std::vector<HeldRow> held_rows(const Interface& interface, const std::vector<cha
   return sliding;
 }
 
-// Those rows of B, whole on every rank: they are few, and the elimination is the same everywhere.
+// The rows of B, whole on every rank: they are few, and the elimination is the same everywhere.
 std::vector<Row> read_rows(const Interface& interface, const std::vector<HeldRow>& held)
 {
   const PairRows<PetscInt> rows(interface.directions);

@@ -76,7 +76,7 @@ StickSlipOperator operator_of(const PathOperators& operators, const Interface& i
   return make_stick_slip_operator(std::move(N), std::move(M), interface.directions, contacts_of(interface));
 }
 
-/// What rank 0 finds on the rows of the pairs, and every rank has then.
+/// The result that rank 0 finds on the rows of the pairs, and every rank has then.
 struct Found
 {
   int completed = 0, increments = 0, iterations = 0, index = 0;

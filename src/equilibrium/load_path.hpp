@@ -7,7 +7,7 @@
 namespace squeal
 {
 
-/// What models of one K and one B share: neither loads nor friction change it.
+/// Operators that models of one K and one B share: neither loads nor friction change it.
 struct PathOperators
 {
   Owned<Mat> K, B;

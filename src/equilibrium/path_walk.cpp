@@ -175,7 +175,7 @@ bool has_no_scale(const PathProblem& problem)
   return problem.ends.size() == 1 && std::ranges::all_of(problem.gap, [](double gap) { return gap == 0; });
 }
 
-/// What a walk that ended early says.
+/// The sentence of a walk that ended early.
 std::string end_of(const PathProblem& problem, const PathWalk& walk)
 {
   return format("there is no continuation beyond %.7g of step '%s'", walk.part, problem.ends[walk.step].name.c_str());

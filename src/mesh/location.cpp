@@ -57,7 +57,7 @@ Axes axes_of(Shape shape)
   }
 }
 
-/// Of the simplex's barycentric coordinates the smallest may be negative; along an axis of the box |xi| may exceed 1.
+/// The smallest barycentric coordinate of a simplex may be negative; along an axis of the box |xi| may exceed 1.
 double excess_of(Shape shape, const Eigen::Vector3d& xi)
 {
   const auto [simplex, box] = axes_of(shape);

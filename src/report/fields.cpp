@@ -231,7 +231,7 @@ public:
     on_file([&](Hdf5File& file) { file.write(data, values, 3); });
   }
 
-  /// The same of a field that ParaView shows at all times.
+  /// Writes a field that ParaView shows at all times.
   void write_still(Vec u, const std::string& data, const std::string& name)
   {
     write(u, data);

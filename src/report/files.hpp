@@ -39,7 +39,7 @@ public:
   {
     write_data(set_of(name), name, {data.size()}, type_of<Value>(), data.data());
   }
-  /// The same with rows of this many entries.
+  /// Writes one with rows of this many entries.
   template <class Value> void write(const std::string& name, const std::vector<Value>& data, std::size_t columns)
   {
     write_data(set_of(name), name, {data.size() / columns, columns}, type_of<Value>(), data.data());

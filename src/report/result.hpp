@@ -50,7 +50,7 @@ struct Result
   const Result* part(const std::string& of) const;
 };
 
-/// What a tree is filled with.
+/// The content that a tree is filled with.
 enum class Content
 {
   results,
@@ -87,7 +87,7 @@ public:
     return result;
   }
 
-  /// The same group, filled with results that the table leaves out and that bring no warnings.
+  /// This group, filled with results that the table leaves out and that bring no warnings.
   Entry hidden() const;
 
   /// The error bar of the result before, in its unit.

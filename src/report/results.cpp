@@ -19,7 +19,7 @@ void add_outcome(Entry out, const Outcome& outcome)
   if (out.has(!outcome.reason.empty())) out.add("reason", "text", "why, where the word is not enough", outcome.reason);
 }
 
-/// What of a contact's slave surface faces the other one.
+/// The part of a contact's slave surface that faces the other one.
 void add_coverage(Entry out, const Contact& contact, const Coverage& coverage)
 {
   out.add("rotor", "text", "the contact's rotor", contact.rotor);
@@ -60,7 +60,7 @@ void add_head(Entry out, const Report& report)
   out.add("heard", "text", "what is heard, and whether it lasts, in one sentence", heard(report, out.scene()));
 }
 
-/// What the run took, and what it ran on.
+/// Times of the run, and versions of what it ran on.
 void add_tail(Entry out, const Report& report)
 {
   const Entry clock = out.group("timings"), processor = out.group("processor_seconds"), of = out.group("versions");
@@ -76,7 +76,7 @@ void add_tail(Entry out, const Report& report)
     of.add(name, "text", "version of squeal and of each library", version);
 }
 
-/// What each stage found, in the order of outcomes_of.
+/// Results of each stage, in the order of outcomes_of.
 constexpr std::array add_found = {add_equilibrium, add_modes, add_estimate,  add_response,   add_transient,
                                   add_coarse,      add_cycle, add_settled,   add_attractors, add_branch,
                                   add_sensitivity, add_sweep, add_robustness};

@@ -51,7 +51,7 @@ void add_mode(Entry out, const ComplexMode& mode)
   out.show("unstable", "switch", "it grows: the real part exceeds 1e-8 of the modulus", is_unstable(mode.lambda));
 }
 
-/// What a count that disagrees may mean.
+/// The meaning of a count that disagrees, and its remedy.
 const char* count_remedy(const Modes& modes)
 {
   if (modes.count.found > modes.count.expected)

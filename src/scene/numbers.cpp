@@ -143,12 +143,6 @@ private:
 
 } // namespace
 
-std::string label_of_number(const Scene& scene, const std::string& key)
-{
-  const std::string name = name_of_number(scene, key);
-  return name.empty() ? key : key + " (" + name + ")";
-}
-
 void resolve_branch(Scene& scene, const Places& places)
 {
   if (!scene.branch) return;

@@ -126,7 +126,7 @@ bool has_unit(const std::string& unit);
 /// Returns the keys of a scene file, its tables in the order in which they are written.
 SceneKeys keys_of(Scene& scene);
 
-/// Those of the tables of stages and studies.
+/// Keys of the tables of stages and studies.
 SceneKeys keys_of(ModesSettings& modes);
 SceneKeys keys_of(EstimateSettings& estimate);
 SceneKeys keys_of(TransientSettings& transient);

@@ -34,7 +34,7 @@ void apply_override(toml::table& root, const std::string& text);
 /// The words of a key between its dots; a word in quotes may hold dots.
 std::vector<std::string> words_of_key(const std::string& key);
 
-/// What a value should be instead, by a rule; empty: the rule allows it.
+/// The values that a rule wants instead of one; empty: the rule allows it.
 std::string problem_of_number(Rule rule, double value);
 
 /// Throws Error for a value of a key that is not as expected. `place`: of the value, with the label of the table.

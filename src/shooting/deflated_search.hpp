@@ -15,7 +15,7 @@ struct DeflatedSearch
   long columns = 0;      // products with the monodromy matrix
 };
 
-/// How the largest pair is told from those that are not sought, and when the search ends.
+/// The choice of the sought pair among Ritz pairs, and the end of the search.
 struct SearchChoice
 {
   std::function<std::size_t(const std::vector<DenseEigenpair>& pairs, const StateBlock& Q)> place;

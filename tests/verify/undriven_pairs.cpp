@@ -26,7 +26,7 @@ SmallModel rubbing_block(double k0, double kt)
   return model;
 }
 
-/// The same without a spring between them.
+/// A pressed block on a spring, without a friction element.
 SmallModel sliding_block(double k)
 {
   SmallModel model;

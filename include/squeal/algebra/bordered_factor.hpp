@@ -128,7 +128,7 @@ private:
   const Factor::Parts* parts_;
 };
 
-/// What factors of a matrix will take, by their symbolic analysis (src/README.md, section 8.9). Of all ranks together.
+/// Memory and entries of a matrix's factors, by their symbolic analysis (src/README.md, section 8.9), of all ranks.
 struct FactorForecast
 {
   FactorKind kind = FactorKind::automatic; // that it will be
@@ -139,7 +139,7 @@ struct FactorForecast
   double operations = 0;                   // to make a Factor, on the rank that has most to do
 };
 
-/// Of a Factor of A and B, and of MUMPS's factors of A in the same order. B may be null. Collective.
+/// Forecasts a Factor of A and B, and MUMPS's factors of A in the same order. B may be null. Collective.
 FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options);
 
 /// x = A^-1 b. The factor has no border. Collective.

@@ -32,14 +32,6 @@ struct TwoSidedPair
 /// The vectors of one side as columns; empty without pairs.
 Eigen::MatrixXcd vectors_of(std::span<const TwoSidedPair> pairs, Eigen::VectorXcd TwoSidedPair::*side);
 
-/// The eigenvalues of solve_dense_quadratic_shared alone, on one rank, which take a quarter of the time.
-std::vector<std::complex<double>> dense_quadratic_eigenvalues(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
-                                                              const Eigen::MatrixXd& K);
-
-/// The vectors of a given eigenvalue, by inverse iteration.
-TwoSidedPair two_sided_pair(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C, const Eigen::MatrixXd& K,
-                            std::complex<double> lambda);
-
 /// The pairs of solve_dense_quadratic_shared with |lambda| <= limit and their left vectors, from the matrices of rank
 /// 0, on every rank. Collective.
 template <class Matrix> std::vector<TwoSidedPair>

@@ -66,7 +66,7 @@ inline PairFriction friction_of_pairs(const Scene& scene, const std::vector<Cont
   return friction;
 }
 
-/// Those of some of the pairs.
+/// The laws of some of the pairs.
 inline PairFriction friction_of_some(PairFriction friction, const std::vector<int>& pairs)
 {
   if (friction.number_of_own.empty()) return friction;

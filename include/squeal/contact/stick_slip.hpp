@@ -13,7 +13,7 @@
 namespace squeal
 {
 
-/// What increments share.
+/// The matrices that increments share.
 struct StickSlipOperator
 {
   Eigen::MatrixXd N, M; // rows x rows
@@ -49,7 +49,7 @@ public:
   /// The change of the state within the statuses by which N w - M r grows by `rhs`, and the laws' residual goes.
   StickSlipState change(const Eigen::VectorXd& rhs) const;
 
-  /// The same without the laws' residual.
+  /// The change within the statuses by `rhs` alone: the laws' residual stays.
   StickSlipState response(const Eigen::VectorXd& rhs) const;
 
   const std::vector<ContactStatus>& statuses() const { return statuses_; }

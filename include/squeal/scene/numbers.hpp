@@ -64,9 +64,6 @@ std::string unit_of_number(const Scene& scene, const std::string& key);
 /// "pad on disc". Empty where the key says it itself.
 std::string name_of_number(const Scene& scene, const std::string& key);
 
-/// The key with that name, if it has one: "contact.1.gap (pad on disc)".
-std::string label_of_number(const Scene& scene, const std::string& key);
-
 /// The numbers with respect to which eigenvalues are derived, with the scene's values. They are those that it names,
 /// else friction and what is not zero of parts, points, bodies, springs, damping and rates of rotation.
 std::vector<SceneNumber> sensitive_numbers(const Scene& scene);

@@ -1,5 +1,5 @@
 #pragma once
-/// What vibrates from a point, and how it was sought.
+/// The motion that was found from a point, and how it was sought.
 #include "squeal/cycle/fidelity.hpp"
 #include "squeal/settled/settled_motion.hpp"
 
