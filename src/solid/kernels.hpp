@@ -24,39 +24,35 @@ template <class Strains> struct StrainPoint
 /// Condenses the parameters with strain operators Ba out of the points. Returns -H^-1 G, the parameters of unit
 /// displacements, one displacement a column.
 template <class Strains, class ParameterStrains, class Elasticity>
-auto condense_parameters(std::vector<StrainPoint<Strains>>& points, const std::vector<ParameterStrains>& Ba,
-                         const Elasticity& D)
+Eigen::MatrixXd condense_parameters(std::vector<StrainPoint<Strains>>& points, const std::vector<ParameterStrains>& Ba,
+                                    const Elasticity& D)
 {
-  constexpr int parameters = ParameterStrains::ColsAtCompileTime, dofs = Strains::ColsAtCompileTime;
-  using Coupling = Eigen::Matrix<double, parameters, dofs>;
-  Eigen::Matrix<double, parameters, parameters> H;
-  Coupling G;
-  H.setZero();
-  G.setZero();
+  const Eigen::Index parameters = Ba.front().cols();
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(parameters, parameters),
+                  G = Eigen::MatrixXd::Zero(parameters, points.front().B.cols());
   for (std::size_t p = 0; p < points.size(); ++p)
   {
     const ParameterStrains stress = points[p].measure * D * Ba[p];
     H += stress.transpose() * Ba[p];
     G += stress.transpose() * points[p].B;
   }
-  const Coupling a = -H.ldlt().solve(G);
+  const Eigen::MatrixXd a = -H.ldlt().solve(G);
   for (std::size_t p = 0; p < points.size(); ++p) points[p].B += Ba[p] * a;
   return a;
 }
 
 /// Returns K = int B' D B, symmetric to the last bit whatever the order of the sums.
 template <class Strains, class Elasticity>
-auto stiffness_matrix(const std::vector<StrainPoint<Strains>>& points, const Elasticity& D)
+Eigen::MatrixXd stiffness_matrix(const std::vector<StrainPoint<Strains>>& points, const Elasticity& D)
 {
-  constexpr int dofs = Strains::ColsAtCompileTime;
-  using Square = Eigen::Matrix<double, dofs, dofs>;
-  Square K = Square::Zero();
+  const Eigen::Index dofs = points.front().B.cols();
+  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(dofs, dofs);
   for (const auto& [B, measure] : points)
   {
     const Strains stress = measure * D * B;
     K.noalias() += B.transpose() * stress;
   }
-  return Square(0.5 * (K + K.transpose()));
+  return 0.5 * (K + K.transpose());
 }
 
 /// Returns the determinant of a Jacobian. Throws std::runtime_error with its value if it is not positive.

@@ -70,173 +70,142 @@ Matrix6 elasticity(const Material& material)
   return D;
 }
 
-template <int columns> using Gradients = Eigen::Matrix<double, 3, columns>;
-template <int columns> using Strains = Eigen::Matrix<double, 6, 3 * columns>;
+using Gradients = Eigen::Matrix3Xd;                       // one function a column
+using Strains = Eigen::Matrix<double, 6, Eigen::Dynamic>; // of unit displacements, one a column
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 /// Returns the strains of displacements whose gradients in x, y, z are the columns of g.
-template <int columns> Strains<columns> strains_of(const Gradients<columns>& g)
+Strains strains_of(const Gradients& g)
 {
-  Strains<columns> B;
-  for (Eigen::Index i = 0; i < columns; ++i)
+  Strains B(6, 3 * g.cols());
+  for (Eigen::Index i = 0; i < g.cols(); ++i)
   {
     const double x = g(0, i), y = g(1, i), z = g(2, i);
-    B.template middleCols<3>(3 * i) << x, 0, 0, /**/ 0, y, 0, /**/ 0, 0, z, /**/ y, x, 0, /**/ 0, z, y, /**/ z, 0, x;
+    B.middleCols<3>(3 * i) << x, 0, 0, /**/ 0, y, 0, /**/ 0, 0, z, /**/ y, x, 0, /**/ 0, z, y, /**/ z, 0, x;
   }
   return B;
 }
 
-/// Returns the natural gradients of the incompatible modes, one a column.
-template <int modes> Gradients<modes> mode_gradients(const Eigen::Vector3d& xi)
+/// The number of incompatible modes.
+Eigen::Index modes_of(Shape shape)
 {
-  Gradients<modes> g;
-  if constexpr (modes == 3)
-    g = (-2 * xi).asDiagonal();
-  else
+  return shape == Shape::hex8 ? 3 : shape == Shape::wedge6 ? 4 : 0;
+}
+
+/// Returns the natural gradients of the incompatible modes, one a column.
+Gradients mode_gradients(Shape shape, const Eigen::Vector3d& xi)
+{
+  Gradients g = Gradients::Zero(3, modes_of(shape));
+  if (shape == Shape::hex8) g.diagonal() = -2 * xi;
+  if (shape == Shape::wedge6)
     g << 2 * xi(0) - 1, 0, xi(1), 0, /**/ 0, 2 * xi(1) - 1, xi(0), 0, /**/ 0, 0, 0, -2 * xi(2);
   return g;
 }
 
-template <int modes> Eigen::Vector3d centre_of_reference()
+Eigen::Vector3d centre_of_reference(Shape shape)
 {
-  return modes == 4 ? Eigen::Vector3d(1. / 3, 1. / 3, 0) : Eigen::Vector3d(0, 0, 0);
+  return shape == Shape::wedge6 ? Eigen::Vector3d(1. / 3, 1. / 3, 0) : Eigen::Vector3d(0, 0, 0);
 }
 
 /// Less their mean over the reference element, which is their value at its centre.
-template <int modes> Gradients<modes> mode_gradients_without_mean(const Eigen::Vector3d& xi)
+Gradients mode_gradients_without_mean(Shape shape, const Eigen::Vector3d& xi)
 {
-  return mode_gradients<modes>(xi) - mode_gradients<modes>(centre_of_reference<modes>());
+  return mode_gradients(shape, xi) - mode_gradients(shape, centre_of_reference(shape));
 }
 
 /// Returns the values of the same modes, which vanish at the nodes.
-template <int modes> Eigen::Vector<double, modes> mode_values(const Eigen::Vector3d& xi)
+VectorXd mode_values(Shape shape, const Eigen::Vector3d& xi)
 {
-  if constexpr (modes == 3)
-    return 1 - xi.array().square();
-  else
-    return {xi(0) * xi(0) - xi(0), xi(1) * xi(1) - xi(1), xi(0) * xi(1), 1 - xi(2) * xi(2)};
+  if (shape == Shape::hex8) return 1 - xi.array().square();
+  if (shape == Shape::wedge6)
+    return Eigen::Vector4d(xi(0) * xi(0) - xi(0), xi(1) * xi(1) - xi(1), xi(0) * xi(1), 1 - xi(2) * xi(2));
+  return {};
 }
 
-/// Strain operators of an element with n nodes and its number of incompatible modes: 3 for hex8, 4 for wedge6, else 0.
-template <int n, int modes> struct Kinematics
+/// Strain operators of an element.
+struct Kinematics
 {
-  std::vector<StrainPoint<Strains<n>>> points;        // of the stiffness rule
-  Eigen::Matrix<double, 3 * modes, 3 * n> amplitudes; // of unit nodal displacements: row 3 k + component of mode k
+  std::vector<StrainPoint<Strains>> points; // of the stiffness rule
+  MatrixXd amplitudes;                      // of unit nodal displacements: row 3 k + component of mode k
 };
 
-template <int n, int modes> Kinematics<n, modes> kinematics(Shape shape, const NodePositions& X, const Matrix6& D)
+Kinematics kinematics(Shape shape, const NodePositions& X, const Matrix6& D)
 {
-  const Quadrature& rule = stiffness_rule(shape);
-  Kinematics<n, modes> result;
-  std::vector<Strains<modes>> mode_strains;
-  Eigen::Matrix3d J0;
-  if constexpr (modes > 0)
-  {
-    J0 = shape_functions(shape, centre_of_reference<modes>()).dN * X.transpose();
-  }
-  for (const auto& [xi, weight, at] : rule)
+  Kinematics result{{}, MatrixXd(0, 3 * X.cols())};
+  std::vector<Strains> mode_strains;
+  const Eigen::Matrix3d J0 = shape_functions(shape, centre_of_reference(shape)).dN * X.transpose();
+  for (const auto& [xi, weight, at] : stiffness_rule(shape))
   {
     const Eigen::Matrix3d J = at.dN * X.transpose(); // J(k, l) = dx_l / dxi_k
     const double determinant = positive_jacobian(J.determinant(), result.points.size());
-    result.points.push_back({strains_of<n>(J.inverse() * at.dN), determinant * weight});
-    if constexpr (modes > 0)
-      mode_strains.push_back(
-          strains_of<modes>(J0.determinant() / determinant * J0.inverse() * mode_gradients_without_mean<modes>(xi)));
+    result.points.push_back({strains_of(J.inverse() * at.dN), determinant * weight});
+    mode_strains.push_back(
+        strains_of(J0.determinant() / determinant * J0.inverse() * mode_gradients_without_mean(shape, xi)));
   }
-  if constexpr (modes > 0) result.amplitudes = condense_parameters(result.points, mode_strains, D);
+  if (modes_of(shape) > 0) result.amplitudes = condense_parameters(result.points, mode_strains, D);
   return result;
 }
 
 /// Returns the matrix with S_ij times the 3 x 3 identity as its blocks.
-template <int rows, int columns>
-Eigen::Matrix<double, 3 * rows, 3 * columns> in_three_directions(const Eigen::Matrix<double, rows, columns>& S)
+MatrixXd in_three_directions(const MatrixXd& S)
 {
-  Eigen::Matrix<double, 3 * rows, 3 * columns> result = Eigen::Matrix<double, 3 * rows, 3 * columns>::Zero();
-  for (Eigen::Index i = 0; i < rows; ++i)
-    for (Eigen::Index j = 0; j < columns; ++j)
-      result.template block<3, 3>(3 * i, 3 * j).diagonal().setConstant(S(i, j));
+  MatrixXd result = MatrixXd::Zero(3 * S.rows(), 3 * S.cols());
+  for (Eigen::Index i = 0; i < S.rows(); ++i)
+    for (Eigen::Index j = 0; j < S.cols(); ++j) result.block<3, 3>(3 * i, 3 * j).diagonal().setConstant(S(i, j));
   return result;
 }
 
 /// Returns M from the scalar mass S = int rho f f' dV of the shape functions and modes, f = (N, m), and the amplitudes
 /// A of the modes. With S partitioned like f, M = S_NN + A' S_mN + S_Nm A + A' S_mm A in three directions.
-template <int n, int modes> Eigen::Matrix<double, 3 * n, 3 * n>
-mass_matrix(Shape shape, const NodePositions& X, const Kinematics<n, modes>& kinematics, double density)
+MatrixXd mass_matrix(Shape shape, const NodePositions& X, const MatrixXd& A, double density)
 {
-  Eigen::Matrix<double, n + modes, n + modes> S = Eigen::Matrix<double, n + modes, n + modes>::Zero();
+  const Eigen::Index n = X.cols(), modes = modes_of(shape);
+  MatrixXd S = MatrixXd::Zero(n + modes, n + modes);
   std::size_t point = 0;
   for (const auto& [xi, weight, at] : mass_rule(shape))
   {
     const double volume = weight * positive_jacobian((at.dN * X.transpose()).determinant(), point++);
-    Eigen::Vector<double, n + modes> f;
-    f.template head<n>() = at.N;
-    if constexpr (modes > 0) f.template tail<modes>() = mode_values<modes>(xi);
+    VectorXd f(n + modes);
+    f << at.N, mode_values(shape, xi);
     S += density * volume * f * f.transpose();
   }
-  Eigen::Matrix<double, 3 * n, 3 * n> M = in_three_directions<n, n>(S.template topLeftCorner<n, n>());
-  if constexpr (modes > 0)
-  {
-    const auto& A = kinematics.amplitudes;
-    const Eigen::Matrix<double, 3 * n, 3 * n> half =
-        A.transpose() * (in_three_directions<modes, n>(S.template bottomLeftCorner<modes, n>()) +
-                         0.5 * in_three_directions<modes, modes>(S.template bottomRightCorner<modes, modes>()) * A);
-    M += half + half.transpose();
-  }
+  MatrixXd M = in_three_directions(S.topLeftCorner(n, n));
+  if (modes == 0) return M;
+  const MatrixXd half = A.transpose() * (in_three_directions(S.bottomLeftCorner(modes, n)) +
+                                         0.5 * in_three_directions(S.bottomRightCorner(modes, modes)) * A);
+  M += half + half.transpose();
   return M;
 }
 
 /// Returns G, K_c and the force of src/README.md, section 1.10. The incompatible modes take part in G, as in the mass.
 /// K_c and the force leave them out, as the stiffness of the stress does: rigid motions then keep no stiffness.
-template <int n, int modes> SpinMatrices spin(Shape shape, const NodePositions& X,
-                                              const Kinematics<n, modes>& kinematics, double density,
-                                              const Rotation& rotation)
+SpinMatrices spin(Shape shape, const NodePositions& X, const MatrixXd& amplitudes, double density,
+                  const Rotation& rotation)
 {
+  const Eigen::Index n = X.cols(), modes = modes_of(shape);
   const Eigen::Vector3d axis(rotation.axis.data()), centre(rotation.centre.data());
-  Eigen::Matrix<double, n + modes, n + modes> S = Eigen::Matrix<double, n + modes, n + modes>::Zero();
-  Eigen::Matrix<double, n, n> centrifugal = Eigen::Matrix<double, n, n>::Zero();
-  SpinMatrices result{{}, {}, Eigen::VectorXd::Zero(3 * n)};
+  MatrixXd S = MatrixXd::Zero(n + modes, n + modes), centrifugal = MatrixXd::Zero(n, n);
+  SpinMatrices result{{}, {}, VectorXd::Zero(3 * n)};
   std::size_t point = 0;
   for (const auto& [xi, weight, at] : mass_rule(shape))
   {
     const Eigen::Matrix3d J = at.dN * X.transpose();
     const double mass = density * weight * positive_jacobian(J.determinant(), point++);
     const Eigen::Vector3d velocity = rotation.rate * axis.cross(X * at.N - centre);
-    Eigen::Vector<double, n + modes> f, df; // values, and derivatives along the velocity
-    f.template head<n>() = at.N;
-    df.template head<n>() = (J.inverse() * at.dN).transpose() * velocity;
-    if constexpr (modes > 0)
-    {
-      f.template tail<modes>() = mode_values<modes>(xi);
-      df.template tail<modes>() = (J.inverse() * mode_gradients<modes>(xi)).transpose() * velocity;
-    }
+    const VectorXd along = (J.inverse() * at.dN).transpose() * velocity;
+    VectorXd f(n + modes), df(n + modes); // values, and derivatives along the velocity
+    f << at.N, mode_values(shape, xi);
+    df << along, (J.inverse() * mode_gradients(shape, xi)).transpose() * velocity;
     S += mass * (f * df.transpose() - df * f.transpose());
-    const Eigen::Vector<double, n> along = df.template head<n>();
     centrifugal -= mass * along * along.transpose();
-    for (Eigen::Index i = 0; i < n; ++i) result.force.template segment<3>(3 * i) += mass * along(i) * velocity;
+    for (Eigen::Index i = 0; i < n; ++i) result.force.segment<3>(3 * i) += mass * along(i) * velocity;
   }
-  Eigen::Matrix<double, 3 * (n + modes), 3 * n> motion; // of the functions f, of unit nodal displacements
-  motion.template topRows<3 * n>().setIdentity();
-  if constexpr (modes > 0) motion.template bottomRows<3 * modes>() = kinematics.amplitudes;
-  result.gyroscopic = motion.transpose() * in_three_directions<n + modes, n + modes>(S) * motion;
-  result.centrifugal = in_three_directions<n, n>(centrifugal);
+  MatrixXd motion(3 * (n + modes), 3 * n); // of the functions f, of unit nodal displacements
+  motion << MatrixXd::Identity(3 * n, 3 * n), amplitudes;
+  result.gyroscopic = motion.transpose() * in_three_directions(S) * motion;
+  result.centrifugal = in_three_directions(centrifugal);
   return result;
-}
-
-/// Calls visit.operator()<n, modes>() with the number of nodes and of incompatible modes of a solid.
-template <class Visit> auto visit_solid(Shape shape, Visit visit)
-{
-  switch (shape)
-  {
-  case Shape::hex8:
-    return visit.template operator()<8, 3>();
-  case Shape::wedge6:
-    return visit.template operator()<6, 4>();
-  case Shape::hex20:
-    return visit.template operator()<20, 0>();
-  case Shape::tet4:
-    return visit.template operator()<4, 0>();
-  default:
-    return visit.template operator()<10, 0>();
-  }
 }
 
 } // namespace
@@ -244,24 +213,15 @@ template <class Visit> auto visit_solid(Shape shape, Visit visit)
 ElementMatrices solid_matrices(Shape shape, const NodePositions& X, const Material& material)
 {
   const Matrix6 D = elasticity(material);
-  return visit_solid(shape,
-                     [&]<int n, int modes>() -> ElementMatrices
-                     {
-                       const auto k = kinematics<n, modes>(shape, X, D);
-                       return {stiffness_matrix(k.points, D), mass_matrix(shape, X, k, material.density)};
-                     });
+  const auto [points, amplitudes] = kinematics(shape, X, D);
+  return {stiffness_matrix(points, D), mass_matrix(shape, X, amplitudes, material.density)};
 }
 
 SpinMatrices spin_matrices(Shape shape, std::span<const Vec3> x, const Material& material, const Rotation& rotation)
 {
-  const Matrix6 D = elasticity(material);
   const NodePositions X = position_matrix(x);
-  return visit_solid(shape,
-                     [&]<int n, int modes>()
-                     {
-                       const auto k = kinematics<n, modes>(shape, X, D);
-                       return spin<n, modes>(shape, X, k, material.density, rotation);
-                     });
+  const Kinematics motion = kinematics(shape, X, elasticity(material));
+  return spin(shape, X, motion.amplitudes, material.density, rotation);
 }
 
 Eigen::MatrixXd stress_stiffness(Shape shape, std::span<const Vec3> x, const Material& material,
@@ -269,40 +229,29 @@ Eigen::MatrixXd stress_stiffness(Shape shape, std::span<const Vec3> x, const Mat
 {
   const NodePositions X = position_matrix(x);
   const std::vector<std::array<double, 6>> stress = solid_stress(shape, x, material, u);
-  return visit_solid(shape,
-                     [&]<int n, int modes>() -> Eigen::MatrixXd
-                     {
-                       Eigen::Matrix<double, n, n> S = Eigen::Matrix<double, n, n>::Zero();
-                       std::size_t point = 0;
-                       for (const auto& [xi, weight, at] : stiffness_rule(shape))
-                       {
-                         const Eigen::Matrix3d J = at.dN * X.transpose();
-                         const Gradients<n> g = J.inverse() * at.dN;
-                         const auto& [xx, yy, zz, xy, yz, zx] = stress[point];
-                         Eigen::Matrix3d sigma;
-                         sigma << xx, xy, zx, xy, yy, yz, zx, yz, zz;
-                         S += weight * positive_jacobian(J.determinant(), point++) * g.transpose() * sigma * g;
-                       }
-                       return in_three_directions<n, n>(S);
-                     });
+  MatrixXd S = MatrixXd::Zero(X.cols(), X.cols());
+  std::size_t point = 0;
+  for (const auto& [xi, weight, at] : stiffness_rule(shape))
+  {
+    const Eigen::Matrix3d J = at.dN * X.transpose();
+    const Gradients g = J.inverse() * at.dN;
+    const auto& [xx, yy, zz, xy, yz, zx] = stress[point];
+    Eigen::Matrix3d sigma;
+    sigma << xx, xy, zx, xy, yy, yz, zx, yz, zz;
+    S += weight * positive_jacobian(J.determinant(), point++) * g.transpose() * sigma * g;
+  }
+  return in_three_directions(S);
 }
 
 std::vector<std::array<double, 6>> solid_stress(Shape shape, std::span<const Vec3> x, const Material& material,
                                                 std::span<const double> u)
 {
   const Matrix6 D = elasticity(material);
-  return visit_solid(shape,
-                     [&]<int n, int modes>()
-                     {
-                       const Eigen::Map<const Eigen::Vector<double, 3 * n>> displacement(u.data());
-                       std::vector<std::array<double, 6>> stress;
-                       for (const auto& [B, measure] : kinematics<n, modes>(shape, position_matrix(x), D).points)
-                       {
-                         std::array<double, 6>& s = stress.emplace_back();
-                         Eigen::Map<Eigen::Vector<double, 6>>(s.data()) = D * (B * displacement);
-                       }
-                       return stress;
-                     });
+  const Eigen::Map<const VectorXd> displacement(u.data(), static_cast<Eigen::Index>(3 * x.size()));
+  std::vector<std::array<double, 6>> stress;
+  for (const auto& [B, measure] : kinematics(shape, position_matrix(x), D).points)
+    Eigen::Map<Eigen::Vector<double, 6>>(stress.emplace_back().data()) = D * (B * displacement);
+  return stress;
 }
 
 int dofs_per_node(Shape shape)

@@ -23,7 +23,7 @@ struct LargeValues
 };
 
 /// Those that a verdict is about.
-inline constexpr LargeValues deciding_values{0.85, 4, 48};
+inline constexpr LargeValues deciding_values{0.85, 4, 24};
 
 /// Collective among the map's ranks.
 ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
