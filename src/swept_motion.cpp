@@ -3,7 +3,6 @@
 #include "squeal/coarse.hpp"
 #include "squeal/find_motion.hpp"
 #include "squeal/report/report.hpp"
-#include "squeal/study/reversed.hpp"
 
 #include <cmath>
 

@@ -2,12 +2,13 @@
 
 #include "reduction_basis.hpp"
 #include "squeal/base/free_memory.hpp"
+#include "squeal/equilibrium/contact_stiffness.hpp"
+#include "squeal/reduction/sliding_basis.hpp"
 #include "squeal/solid/structure.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 
 namespace squeal
 {
@@ -18,113 +19,6 @@ namespace
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// Own rows of A that are not empty, in order.
-std::vector<PetscInt> own_rows(Mat A)
-{
-  PetscInt first = 0;
-  std::vector<PetscInt> rows;
-  check(MatGetOwnershipRange(A, &first, nullptr));
-  for_each_row(A,
-               [&](PetscInt row, std::span<const PetscInt>, std::span<const PetscScalar> values)
-               {
-                 if (std::any_of(values.begin(), values.end(), [](double value) { return value != 0; }))
-                   rows.push_back(row - first);
-               });
-  return rows;
-}
-
-MultiVector rows_of(const MultiVector& X, const std::vector<PetscInt>& rows)
-{
-  return {X.comm, X.entries(rows, Eigen::all)};
-}
-
-/// What the left shapes Y y have beyond Z y: rows of few degrees of freedom, so that Y y itself is not stored.
-struct LeftPart
-{
-  std::vector<PetscInt> rows; // own ones
-  MultiVector entries;        // (Y - Z) y on these
-  MatrixXd on_pairs;          // B (Y - Z) y, B of the active pairs
-};
-
-/// The rows of A that are not empty anywhere, without the others. `rows`: own ones.
-Owned<Mat> only_rows(Mat A, const std::vector<PetscInt>& rows)
-{
-  PetscInt first = 0, first_column = 0, last_column = 0;
-  check(MatGetOwnershipRange(A, &first, nullptr));
-  check(MatGetOwnershipRangeColumn(A, &first_column, &last_column));
-  std::vector<PetscInt> global = rows;
-  for (PetscInt& row : global) row += first;
-  const MPI_Comm comm = comm_of(A);
-  Owned<IS> taken, columns;
-  Owned<Mat> result;
-  check(ISCreateGeneral(comm, static_cast<PetscInt>(global.size()), global.data(), PETSC_COPY_VALUES, taken.put()));
-  check(ISCreateStride(comm, last_column - first_column, first_column, 1, columns.put()));
-  check(MatCreateSubMatrix(A, taken, columns, MAT_INITIAL_MATRIX, result.put()));
-  return result;
-}
-
-/// Of shapes X = Z y.
-LeftPart left_part(const ClosedContact& contact, Mat B, const MultiVector& X)
-{
-  const Owned<Mat> difference = copy_of(contact.Y);
-  Owned<Mat> of_motions, on_pairs;
-  check(MatAXPY(difference, -1, contact.Z, DIFFERENT_NONZERO_PATTERN));
-  check(MatMatMult(difference, kept_rows(contact), MAT_INITIAL_MATRIX, PETSC_DEFAULT, of_motions.put()));
-  check(MatMatMult(B, of_motions, MAT_INITIAL_MATRIX, PETSC_DEFAULT, on_pairs.put()));
-  LeftPart part{own_rows(of_motions), {}, {}};
-  part.entries = product(only_rows(of_motions, part.rows), X);
-  part.on_pairs = whole_product(on_pairs, X);
-  return part;
-}
-
-/// Shapes as motions.
-struct Shapes
-{
-  const MultiVector& X; // Z y
-  const LeftPart& left;
-};
-
-/// Own rows of the left shapes; `rows` ascend.
-MultiVector left_rows(const Shapes& shapes, const std::vector<PetscInt>& rows)
-{
-  MultiVector result = rows_of(shapes.X, rows);
-  for (std::size_t i = 0; i < shapes.left.rows.size(); ++i)
-    if (const auto found = std::lower_bound(rows.begin(), rows.end(), shapes.left.rows[i]);
-        found != rows.end() && *found == shapes.left.rows[i])
-      result.entries.row(found - rows.begin()) += shapes.left.entries.entries.row(static_cast<Index>(i));
-  return result;
-}
-
-/// M, C and K on X, tested by X and by the left shapes. Adds the gyroscopic part to C.
-void project(ReducedModel& model, const Structure& structure, const Shapes& shapes)
-{
-  const auto& [X, left] = shapes;
-  MultiVector followed{X.comm, MatrixXd(left.entries.entries.rows(), X.columns())};
-  const auto keep = [&](Index first, const MultiVector& image)
-  { followed.entries.middleCols(first, image.columns()) = image.entries(shapes.left.rows, Eigen::all); };
-  const auto set = [&](Mat matrix, MatrixXd& unsymmetric, MatrixXd& symmetric)
-  {
-    if (symmetric.size() > 0) // of the basis
-      followed = product(only_rows(matrix, left.rows), X);
-    else
-      symmetric = symmetric_inner_products(X, matrix, keep);
-    unsymmetric = symmetric + inner_products(left.entries, followed);
-  };
-  set(structure.M, model.M, model.M_z);
-  set(structure.K, model.K, model.K_z);
-  if (const std::optional<Rayleigh> damping = rayleigh_part(structure.M, structure.C, structure.K))
-  {
-    model.C_z = damping->of_mass * model.M_z + damping->of_stiffness * model.K_z;
-    model.C = damping->of_mass * model.M + damping->of_stiffness * model.K;
-  }
-  else
-    set(structure.C, model.C, model.C_z);
-  if (!structure.G.get()) return;
-  MatrixXd skew = symmetric_inner_products(X, structure.G, keep); // below the diagonal
-  skew.triangularView<Eigen::StrictlyUpper>() = -skew.transpose();
-  model.C += skew + inner_products(left.entries, followed);
-}
 
 Eigen::SparseMatrix<double> identity_of_rows(Mat A)
 {
@@ -210,35 +104,52 @@ struct ClosedPairs
   const std::vector<double>& reactions; // [N] a contact vector
 };
 
-/// Adds to K the springs of pairs with a compliance, with the friction that follows. Adds to C friction that turns.
-void add_unsymmetric_parts(ReducedModel& model, const SlidingEquilibrium& sliding, const ClosedPairs& pairs,
-                           const Shapes& shapes)
+/// Sliding pairs taken out, with the springs of those that have a compliance and friction that turns.
+LinearisedPoint without_sliding_pairs(const SlidingEquilibrium& sliding, const ClosedPairs& pairs)
 {
-  const Interface& interface = sliding.interface;
-  const auto add = [&](Mat A, MatrixXd& reduced)
-  {
-    const std::vector<PetscInt> rows = own_rows(A);
-    reduced += inner_products(left_rows(shapes, rows), product(only_rows(A, rows), shapes.X));
-  };
-  if (const Owned<Mat> forces = contact_stiffness(interface, pairs.sliding, PairForces::with_friction); forces.get())
-    add(forces, model.K);
-  if (const Owned<Mat> turning = friction_damping(interface, pairs.follows, pairs.reactions, FrictionDamping::whole);
-      turning.get())
-    add(turning, model.C);
+  const auto& [structure, interface, equilibrium] = sliding;
+  return {sliding, eliminate_closed_pairs(structure, interface, pairs.sliding),
+          damping_of_pairs(interface, pairs.follows, pairs.reactions, FrictionDamping::whole),
+          stiffness_of_pairs(interface, pairs.sliding, PairForces::with_friction)};
 }
 
-/// M, C and K on the shapes, tested by the left ones.
-void set_matrices(ReducedModel& model, const SlidingEquilibrium& sliding, const ClosedPairs& pairs,
-                  const Shapes& shapes)
+/// The structure with the viscous equivalent of loss factors in their place.
+Structure viscous(const Structure& structure)
 {
-  project(model, sliding.structure, shapes);
-  add_unsymmetric_parts(model, sliding, pairs, shapes);
+  Structure result;
+  for (const auto matrix : {&Structure::M, &Structure::C, &Structure::K, &Structure::G})
+    result.*matrix = shared((structure.*matrix).get());
+  return result;
 }
 
-} // namespace
-
-namespace
+/// A model's matrices on its shapes.
+struct OnShapes
 {
+  SlidingBasis basis;
+  Lift left; // what the left shapes have beyond the others
+};
+
+/// Sets M, C and K on the shapes X, tested by the left ones, and G and H of the active pairs' rows B.
+OnShapes set_matrices(ReducedModel& model, const LinearisedPoint& point, MultiVector X, Mat B)
+{
+  OnShapes on{{std::move(X)}, {}};
+  SlidingBasis& basis = on.basis;
+  set_model(basis, viscous(point.sliding.structure), point.sliding.interface);
+  on.left = lift(basis, point.contact, point.contact.Y);
+  ProjectedSliding projected = project(basis, point);
+  model.M = std::move(projected.M);
+  model.C = std::move(projected.C);
+  model.K = std::move(projected.K);
+  if (model.M_z.size() == 0) model.M_z = basis.M.products; // else it is the basis' own
+  model.K_z = basis.K.products;
+  if (basis.rayleigh)
+    model.C_z = basis.rayleigh->of_mass * model.M_z + basis.rayleigh->of_stiffness * model.K_z;
+  else
+    model.C_z = basis.C.products;
+  model.G = whole_product(B, basis.T);
+  model.H = (model.G + whole_product(at_pivots(B, point.contact), on.left.change)).transpose();
+  return on;
+}
 
 /// E = Z'(K + omega^2 M)Z, bordered by P.
 Factor energy_factor(Mat K, Mat M, double omega, Mat Z, Mat P, const FactorOptions& options)
@@ -279,7 +190,11 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   const auto& [structure, interface, equilibrium] = sliding;
   const std::vector<int>& active = roles.active;
   ReducedModel model;
-  const ClosedContact contact = eliminate_closed_pairs(structure, interface, roles.sliding);
+  std::vector<char> follows = roles.sliding; // pairs whose friction follows their normal force
+  if (reduction.sliding)
+    for (const int pair : active) follows[static_cast<std::size_t>(pair)] = 1; // no reaction while open
+  const LinearisedPoint point = without_sliding_pairs(sliding, {roles.sliding, follows, roles.reactions});
+  const ClosedContact& contact = point.contact;
   const double omega = modes.front().lambda.imag();
 
   // the modes, and what solves for the shapes of the pairs' forces
@@ -307,20 +222,14 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
                    structure.M, limits_of(reduction, structure, shapes.columns()));
   }
   // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.
-  const LeftPart left = left_part(contact, B, X);
-  std::vector<char> follows = roles.sliding; // pairs whose friction follows their normal force
-  if (reduction.sliding)
-    for (const int pair : active) follows[static_cast<std::size_t>(pair)] = 1; // no reaction while open
-  set_matrices(model, sliding, {roles.sliding, follows, roles.reactions}, {X, left});
-  model.G = whole_product(B, X);
-  model.H = (forces.transpose() * (model.G + left.on_pairs)).transpose();
+  model.shapes = std::move(set_matrices(model, point, std::move(X), B).basis.T);
+  model.H = (model.H * forces).eval();
   if (reduction.sliding) model.G = normal_rows(model.G, interface.directions);
   model.E_factor.compute(model.K_z + omega * omega * model.M_z);
   model.M_factor.compute(model.M_z);
   if (model.M_factor.info() != Eigen::Success || model.E_factor.info() != Eigen::Success)
     throw Error("reduced model: a shape has no mass or no stiffness: give massless points a mass, or set "
                 "fidelity = \"full\"");
-  model.shapes = std::move(X);
   model.active = active;
   if (!reduction.sliding) model.of_left_out = normal_rows(model.of_left_out, interface.directions);
   set_active_pairs(model, interface, equilibrium, reduction.sliding);
@@ -360,14 +269,11 @@ Owned<Vec> unbalanced_force(const SlidingEquilibrium& about, const SlidingEquili
 ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibrium& about,
                                 const SlidingEquilibrium& other, const PairRoles& roles)
 {
-  const ClosedContact contact = eliminate_closed_pairs(other.structure, other.interface, roles.sliding);
+  const LinearisedPoint point =
+      without_sliding_pairs(other, {roles.sliding, roles.sliding, other.equilibrium.reactions});
   ReducedModel result;
-  const Owned<Mat> B = rows_of(other.interface, model.active, RowsTaken::all);
-  const LeftPart left = left_part(contact, B, model.shapes);
-  const Shapes shapes{model.shapes, left};
-  set_matrices(result, other, {roles.sliding, roles.sliding, other.equilibrium.reactions}, shapes);
-  result.G = whole_product(B, model.shapes);
-  result.H = (result.G + left.on_pairs).transpose();
+  const auto [basis, left] =
+      set_matrices(result, point, model.shapes, rows_of(other.interface, model.active, RowsTaken::all));
   result.active = model.active;
   set_active_pairs(result, other.interface, about.equilibrium, false);
   result.gap = model.gap;
@@ -375,8 +281,9 @@ ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibr
   result.slow = model.slow;
   const Owned<Vec> force = unbalanced_force(about, other, roles);
   const MultiVector unbalanced = columns_of(std::array{force.get()});
-  result.force =
-      (inner_products(model.shapes, unbalanced) + inner_products(left.entries, rows_of(unbalanced, left.rows))).col(0);
+  result.force = (inner_products(model.shapes, unbalanced) +
+                  inner_products(left.change, {unbalanced.comm, unbalanced.entries(left.pivots, Eigen::all)}))
+                     .col(0);
   return result;
 }
 

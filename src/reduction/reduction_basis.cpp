@@ -4,6 +4,7 @@
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/error.hpp"
+#include "squeal/reduction/sliding_basis.hpp"
 #include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>
@@ -136,22 +137,6 @@ double highest_frequency(const std::vector<ComplexMode>& modes)
   return highest;
 }
 
-Owned<Mat> kept_rows(const ClosedContact& contact)
-{
-  PetscInt first = 0, last = 0, column = 0, last_column = 0;
-  check(MatGetOwnershipRange(contact.Z, &first, &last));
-  check(MatGetOwnershipRangeColumn(contact.Z, &column, &last_column));
-  Owned<Mat> S;
-  check(MatCreateAIJ(comm_of(contact.Z), last_column - column, last - first, PETSC_DETERMINE, PETSC_DETERMINE, 1,
-                     nullptr, 0, nullptr, S.put()));
-  for (PetscInt row = first; row < last; ++row) // y holds them in their order
-    if (!std::binary_search(contact.pivots.begin(), contact.pivots.end(), row))
-      check(MatSetValue(S, column++, row, 1, INSERT_VALUES));
-  check(MatAssemblyBegin(S, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(S, MAT_FINAL_ASSEMBLY));
-  return S;
-}
-
 ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction,
                          const ClosedContact& contact)
 {
@@ -181,8 +166,8 @@ ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction&
   std::vector<Vec> columns;
   for (const ModeShape& shape : shapes) columns.push_back(shape.shape);
   columns.insert(columns.end(), reduction.more.begin(), reduction.more.end());
-  const Owned<Mat> S = kept_rows(contact);
-  return {product(contact.Z, product(S, columns_of(columns))), static_cast<Index>(reduction.more.size()), of_apart};
+  return {product(contact.Z, kept_rows(columns_of(columns), contact)), static_cast<Index>(reduction.more.size()),
+          of_apart};
 }
 
 Eigen::SparseMatrix<double> sliding_forces(const Interface& interface, const std::vector<int>& active)

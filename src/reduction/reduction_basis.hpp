@@ -10,9 +10,6 @@
 namespace squeal
 {
 
-/// S: the degrees of freedom that the elimination keeps, y = S u of u = Z y.
-Owned<Mat> kept_rows(const ClosedContact& contact);
-
 /// Shapes of modes, then further ones. Those of the modes kept apart are the last ones.
 struct ModeColumns
 {
@@ -21,7 +18,7 @@ struct ModeColumns
 };
 
 /// The followed mode is the first; the others nearest to it in frequency. Real and imaginary parts. Then real modes.
-/// Those kept apart are the last ones. All as motions that keep the eliminated pairs closed, Z S u.
+/// Those kept apart are the last ones. All as motions Z y that keep the eliminated pairs closed.
 ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction,
                          const ClosedContact& contact);
 

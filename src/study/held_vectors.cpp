@@ -1,6 +1,6 @@
 #include "held_vectors.hpp"
 
-#include "sliding_basis.hpp"
+#include "squeal/reduction/sliding_basis.hpp"
 
 #include <algorithm>
 #include <cmath>

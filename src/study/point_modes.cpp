@@ -1,12 +1,13 @@
 #include "point_modes.hpp"
 
+#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/constants.hpp"
-#include "squeal/equilibrium/contact_stiffness.hpp"
 #include "squeal/modes/real_modes.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <Eigen/Cholesky>
 #include <random>
 #include <ranges>
 
@@ -34,22 +35,33 @@ constexpr double slow = 0.8;           // ratio of errors before and after a cor
 constexpr int most_passes = 20;        // corrections of the basis; the first one of a brake may need more than 8
 constexpr double spurious_mode = 1e-8; // backward error of what is no mode
 
-/// The closed pairs taken out, and on the rows of B the damping of the friction direction and the stiffness of pairs
-/// with a compliance; null where there is none.
-struct LinearisedPoint
+/// The problem at a point on the basis. `kept`: inner products of the shapes without the pivots. `independent`:
+/// combinations of shapes that stay so without the pivots; empty: all do.
+struct PointMatrices : ProjectedSliding
 {
-  ClosedContact contact;
-  Owned<Mat> damping{}, stiffness{};
+  MatrixXd kept{}, independent{};
 };
 
-LinearisedPoint linearise_point(const SlidingEquilibrium& sliding)
+/// Orthonormal combinations of the shapes that hold more than a trace of other degrees of freedom than the pivots, by
+/// the inner products without these; empty: every combination does. What a lift makes of the others is rounding: its
+/// projection is singular, with any number for an eigenvalue.
+MatrixXd independent_part(const MatrixXd& kept)
 {
-  const auto& [structure, interface, equilibrium] = sliding;
-  LinearisedPoint point{eliminate_closed_pairs(structure, interface, equilibrium.closed)};
-  const auto part = interface.friction.common.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
-  point.damping = damping_of_pairs(interface, equilibrium.closed, equilibrium.reactions, part);
-  point.stiffness = stiffness_of_pairs(interface, equilibrium.closed, PairForces::with_friction);
-  return point;
+  constexpr double trace = 1e-12; // square of a part of 1e-6: rounding leaves it a relative error of 1e-10
+  const MatrixXd shifted = kept - trace * MatrixXd::Identity(kept.rows(), kept.cols());
+  if (shifted.llt().info() == Eigen::Success) return {}; // as mostly, at a tenth of the work
+  const SymmetricEigenpairs parts = solve_dense_symmetric(kept);
+  return parts.y.rightCols((parts.lambda.array() >= trace).count());
+}
+
+PointMatrices matrices_at(const SlidingBasis& basis, const LinearisedPoint& point)
+{
+  PointMatrices at{project(basis, point)};
+  const MultiVector at_pivots{basis.T.comm, basis.T.entries(local_pivots(point.contact), Eigen::all)},
+      of_shapes = columns_from(at_pivots, basis.sketched);
+  at.kept = MatrixXd::Identity(basis.shapes(), basis.shapes()) - inner_products(of_shapes, of_shapes);
+  at.independent = independent_part(at.kept);
+  return at;
 }
 
 /// Static shapes of forces on eliminated pairs that the basis takes for open.
@@ -104,7 +116,7 @@ double scale_of(const ModesBasis& modes, Complex lambda)
 }
 
 /// Backward errors in the full problem, estimated by the random vectors. Left vectors solve the transposed problem.
-std::vector<double> backward_errors(const ModesBasis& modes, const ProjectedSliding& on_basis,
+std::vector<double> backward_errors(const ModesBasis& modes, const PointMatrices& on_basis,
                                     const std::vector<TwoSidedPair>& pairs, Side side)
 {
   if (pairs.empty()) return {};
@@ -152,56 +164,21 @@ MatrixXcd random_weights(Index rows, Index columns)
 
 /// Appends to `residuals` those of some vectors, over their backward error's scale, with zeros at the pivots. Of many,
 /// random mixtures of real and imaginary parts span the same leading directions.
-void append_residuals(const ModesBasis& modes, const PointProblem& problem, const LinearisedPoint& point,
-                      const std::vector<TwoSidedPair>& pairs, Side side, MultiVector& residuals)
+void append_residuals(const ModesBasis& modes, const LinearisedPoint& point, const std::vector<TwoSidedPair>& pairs,
+                      Side side, MultiVector& residuals)
 {
   if (pairs.empty()) return;
-  const auto& [structure, interface, equilibrium] = problem.sliding;
-  const bool right = side == Side::right;
-  const double of_skew = right ? 1 : -1;
-  const Mat lift = right ? point.contact.Z : point.contact.Y;
-  const Owned<Mat> test = transpose_of(right ? point.contact.Y : point.contact.Z);
-  MatrixXcd weights = random_weights(static_cast<Index>(pairs.size()), mixtures);
-  for (std::size_t k = 0; k < pairs.size(); ++k) weights.row(static_cast<Index>(k)) /= scale_of(modes, pairs[k].lambda);
+  Eigen::VectorXcd lambda(static_cast<Index>(pairs.size()));
+  MatrixXcd weights = random_weights(lambda.size(), mixtures);
+  for (Index k = 0; k < lambda.size(); ++k)
+  {
+    lambda(k) = pairs[static_cast<std::size_t>(k)].lambda;
+    weights.row(k) /= scale_of(modes, lambda(k));
+  }
   const MatrixXcd a = vectors_of(pairs, side);
-  const auto times = [&](MatrixXcd x, auto factor_of)
-  {
-    for (std::size_t k = 0; k < pairs.size(); ++k) x.row(static_cast<Index>(k)) *= factor_of(pairs[k]);
-    return x;
-  };
-  const auto mixed = [&](const MatrixXcd& by)
-  { return product(lift, kept_rows(combination_of_shapes(modes.basis, (a * by).real()), point.contact)); };
-  const auto on_pairs = [&](Mat D, const MultiVector& x)
-  {
-    const Owned<Mat> of_side = right ? copy_of(D) : transpose_of(D);
-    return product(transpose_of(interface.B), product(of_side, product(interface.B, x)));
-  };
-  // lambda^2 M x + lambda C x + K x + f K_loss x, the factors within the weights
-  const auto lambda = [](const TwoSidedPair& pair) { return pair.lambda; };
-  const MatrixXcd rates = times(weights, lambda);
-  MultiVector x = mixed(weights), v = mixed(rates), acceleration = mixed(times(rates, lambda));
-  MultiVector force = empty_multivector(structure.K);
-  force.entries.setZero(x.entries.rows(), x.columns());
-  const auto add = [&](double factor, const MultiVector& part) { force.entries += factor * part.entries; };
-  if (structure.H.get()) add(of_skew, product(structure.H, x));
-  if (point.stiffness.get()) add(1, on_pairs(point.stiffness, x));
-  if (structure.K_loss.get())
-  {
-    const auto f = [](const TwoSidedPair& pair) { return loss_factor_of(pair.lambda); };
-    add(1, product(structure.K_loss, mixed(times(weights, f))));
-  }
-  if (structure.G.get()) add(of_skew, product(structure.G, v));
-  if (point.damping.get()) add(1, on_pairs(point.damping, v));
-  if (const auto& rayleigh = modes.basis.rayleigh)
-  {
-    x.entries += rayleigh->of_stiffness * v.entries;
-    acceleration.entries += rayleigh->of_mass * v.entries;
-  }
-  else
-    add(1, product(modes.basis.C.matrix, v));
-  add(1, product(structure.K, x));
-  add(1, product(structure.M, acceleration));
-  append(residuals, with_zero_pivots(product(test, force), point.contact));
+  const auto y = [&](const MatrixXcd& by)
+  { return kept_rows(combination_of_shapes(modes.basis, (a * by).real()), point.contact); };
+  append(residuals, with_zero_pivots(dynamic_forces(modes.basis, point, side, {lambda, weights, y}), point.contact));
 }
 
 /// The backward error that a pair may have. Near the limit of stability it is a hundredth: of the error of lambda, the
@@ -240,7 +217,7 @@ enum class Extent
 };
 
 /// The backward errors of pairs of the projected problem.
-SolvedPairs with_errors(const ModesBasis& modes, const ProjectedSliding& on_basis, std::vector<TwoSidedPair> pairs)
+SolvedPairs with_errors(const ModesBasis& modes, const PointMatrices& on_basis, std::vector<TwoSidedPair> pairs)
 {
   SolvedPairs solved{std::move(pairs), {}, {}};
   solved.right = backward_errors(modes, on_basis, solved.pairs, Side::right);
@@ -250,7 +227,7 @@ SolvedPairs with_errors(const ModesBasis& modes, const ProjectedSliding& on_basi
 
 /// The projected problem on the independent combinations of the shapes, which come after the sketched columns; K_loss
 /// is empty without loss factors.
-LossyMatrices without_sketch(const ProjectedSliding& on_basis, Index shapes)
+LossyMatrices without_sketch(const PointMatrices& on_basis, Index shapes)
 {
   const MatrixXd& V = on_basis.independent;
   const auto on_shapes = [&](const MatrixXd& A) -> MatrixXd
@@ -276,8 +253,7 @@ void transform(std::vector<TwoSidedPair>& pairs, const MatrixXd& of_right, const
 }
 
 /// The pairs of the projected problem in the window, falling growth rate.
-SolvedPairs solve_projected(const ModesBasis& modes, const ProjectedSliding& on_basis, const Window& window,
-                            Extent extent)
+SolvedPairs solve_projected(const ModesBasis& modes, const PointMatrices& on_basis, const Window& window, Extent extent)
 {
   const MPI_Comm comm = modes.basis.T.comm;
   LossyMatrices problem = without_sketch(on_basis, modes.basis.shapes());
@@ -323,7 +299,7 @@ bool complete(ModesBasis& modes, const PointProblem& problem)
 }
 
 /// The result of a point, without what is no mode.
-PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const ProjectedSliding& on_basis, Index shapes)
+PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const PointMatrices& on_basis, Index shapes)
 {
   PointModes result;
   result.outcome.kind = OutcomeKind::converged;
@@ -399,10 +375,9 @@ MultiVector expanded(const ModesBasis& modes, const ClosedContact& contact, cons
 
 PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
 {
-  const auto& [structure, interface, equilibrium] = problem.sliding;
-  set_model(modes.basis, structure, interface);
+  set_model(modes.basis, problem.sliding.structure, problem.sliding.interface);
   const LinearisedPoint point = linearise_point(problem.sliding);
-  attach(modes, interface, point.contact.pairs);
+  attach(modes, problem.sliding.interface, point.contact.pairs);
   const double end = two_pi * followed_band * problem.band;
   const Window window{vibration_floor(modes.norms), end * end};
   Extent extent =
@@ -411,7 +386,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
   for (PetscInt pass = 0;; ++pass)
   {
     problem.end_if_asked();
-    const ProjectedSliding on_basis = project(modes.basis, point.contact, point.damping, point.stiffness);
+    const PointMatrices on_basis = matrices_at(modes.basis, point);
     SolvedPairs solved = solve_projected(modes, on_basis, window, extent);
     double now = largest_excess(solved, problem);
     if (extent == Extent::near_band && now > 1 && now > slow * before)
@@ -427,7 +402,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
     MultiVector residuals{modes.basis.T.comm, MatrixXd(modes.basis.T.entries.rows(), 0)};
     if (pass < most_passes)
       for (const Side side : {Side::right, Side::left})
-        append_residuals(modes, problem, point, inexact(solved, problem, side), side, residuals);
+        append_residuals(modes, point, inexact(solved, problem, side), side, residuals);
     if (correct(modes, std::move(residuals))) continue;
     const bool misses = now > 1;
     if (misses && complete(modes, problem))

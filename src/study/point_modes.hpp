@@ -1,11 +1,11 @@
 #pragma once
 /// The modes of a sliding equilibrium on a basis that serves many, with left vectors, checked by the full residual
 /// (src/README.md, section 10.2).
-#include "sliding_basis.hpp"
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/modes/dense_losses.hpp"
 #include "squeal/modes/modes.hpp"
 #include "squeal/modes/quadratic.hpp"
+#include "squeal/reduction/sliding_basis.hpp"
 #include "squeal/study/sweep.hpp"
 
 #include <functional>
@@ -63,12 +63,6 @@ struct PointModes
   std::vector<TwoSidedPair> pairs; // falling growth rate, up to a little beyond the band
   std::vector<double> errors;      // the larger backward error of both vectors
   Eigen::MatrixXd M{}, C{};        // of the point, on the basis
-};
-
-enum class Side
-{
-  right,
-  left,
 };
 
 /// The vectors of one side in the structure's degrees of freedom: the real parts of all, then the imaginary ones.

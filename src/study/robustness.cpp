@@ -285,8 +285,8 @@ Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
                                                });
     if (failed.reason.empty()) failed = check_failed;
   }
-  share(result.samples, comm);
-  share(result.checks, comm);
+  share_in_turn(result.samples, comm);
+  share_in_turn(result.checks, comm);
   share(unstable, comm);
   find_probabilities(result, unstable, sampler.reference().eigenvalues(), problem.settings.confidence);
   find_correlations(result, problem.numbers.size());

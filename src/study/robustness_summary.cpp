@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <boost/math/distributions/binomial.hpp>
+#include <iterator>
 #include <limits>
 #include <numeric>
 
@@ -15,11 +16,6 @@ namespace
 {
 
 using Complex = std::complex<double>;
-
-void sum_over_ranks(std::vector<double>& values, MPI_Comm comm)
-{
-  MPI_Allreduce(MPI_IN_PLACE, values.data(), to_int(values.size()), MPI_DOUBLE, MPI_SUM, comm);
-}
 
 /// Places of values in ascending order, from 0.
 std::vector<double> ranks_of_values(const std::vector<double>& values)
@@ -56,51 +52,29 @@ Probability probability_of(int count, int samples, double confidence)
   return result;
 }
 
-void share(std::vector<RobustSample>& samples, MPI_Comm comm)
+void describe(Checkpoint& checkpoint, RobustSample& sample)
 {
-  std::vector<double> flat;
-  for (const RobustSample& s : samples)
-    flat.insert(flat.end(), {s.known ? 1. : 0., static_cast<double>(s.closed), static_cast<double>(s.unstable),
-                             s.growth_rate, s.frequency_hz, s.mode + 1.});
-  sum_over_ranks(flat, comm);
-  for (std::size_t k = 0; k < samples.size(); ++k)
-  {
-    const double* entry = flat.data() + 6 * k;
-    RobustSample& s = samples[k];
-    s = {s.values, entry[0] != 0, static_cast<int>(entry[1]),    static_cast<int>(entry[2]),
-         entry[3], entry[4],      static_cast<int>(entry[5]) - 1};
-  }
+  describe_all(checkpoint, sample.values, sample.known, sample.closed, sample.unstable, sample.growth_rate,
+               sample.frequency_hz, sample.mode);
 }
 
-void share(std::vector<RobustCheck>& checks, MPI_Comm comm)
+void describe(Checkpoint& checkpoint, RobustCheck& check)
 {
-  std::vector<double> flat;
-  for (const RobustCheck& c : checks)
-    flat.insert(flat.end(), {c.known ? 1. : 0., static_cast<double>(c.unstable),
-                             static_cast<double>(c.unstable_reduced), c.growth_error, c.frequency_error});
-  sum_over_ranks(flat, comm);
-  for (std::size_t k = 0; k < checks.size(); ++k)
-  {
-    const double* entry = flat.data() + 5 * k;
-    checks[k] = {checks[k].sample,           entry[0] != 0, static_cast<int>(entry[1]),
-                 static_cast<int>(entry[2]), entry[3],      entry[4]};
-  }
+  describe_all(checkpoint, check.sample, check.known, check.unstable, check.unstable_reduced, check.growth_error,
+               check.frequency_error);
+}
+
+void describe(Checkpoint& checkpoint, UnstableMode& mode)
+{
+  describe_all(checkpoint, mode.sample, mode.mode, mode.lambda);
 }
 
 void share(std::vector<UnstableMode>& modes, MPI_Comm comm)
 {
-  const int ranks = ranks_of(comm), mine = 4 * to_int(modes.size());
-  std::vector<int> counts(static_cast<std::size_t>(ranks)), starts(counts.size());
-  MPI_Allgather(&mine, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
-  std::exclusive_scan(counts.begin(), counts.end(), starts.begin(), 0);
-  std::vector<double> own, all(static_cast<std::size_t>(starts.back() + counts.back()));
-  for (const UnstableMode& mode : modes)
-    own.insert(own.end(), {static_cast<double>(mode.sample), static_cast<double>(mode.mode), mode.lambda.real(),
-                           mode.lambda.imag()});
-  MPI_Allgatherv(own.data(), mine, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, comm);
-  modes.clear();
-  for (std::size_t i = 0; i + 3 < all.size(); i += 4)
-    modes.push_back({static_cast<int>(all[i]), static_cast<int>(all[i + 1]), {all[i + 2], all[i + 3]}});
+  std::vector<UnstableMode> all;
+  for (int rank = 0; rank < ranks_of(comm); ++rank)
+    std::ranges::copy(of_rank(rank, modes, comm), std::back_inserter(all));
+  modes = std::move(all);
   std::ranges::stable_sort(modes, {}, &UnstableMode::sample);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 /// What the ranks found of random samples, put together: probabilities and correlations (src/README.md, section 12.3).
 #include "squeal/study/robustness.hpp"
+#include "sweep_checkpoint.hpp"
 
 namespace squeal
 {
@@ -15,9 +16,21 @@ struct UnstableMode
   std::complex<double> lambda{};
 };
 
-/// Gives every rank the samples that each has computed: the others' entries are zero.
-void share(std::vector<RobustSample>& samples, MPI_Comm comm);
-void share(std::vector<RobustCheck>& checks, MPI_Comm comm);
+void describe(Checkpoint& checkpoint, RobustSample& sample);
+void describe(Checkpoint& checkpoint, RobustCheck& check);
+void describe(Checkpoint& checkpoint, UnstableMode& mode);
+
+/// Gives every rank the entries that each has computed, in turn: the first rank the first of them. Collective.
+template <class Entry> void share_in_turn(std::vector<Entry>& entries, MPI_Comm comm)
+{
+  const std::vector<Entry> own = entries;
+  for (int rank = 0; rank < ranks_of(comm); ++rank)
+  {
+    const std::vector<Entry> theirs = of_rank(rank, own, comm);
+    for (auto k = static_cast<std::size_t>(rank); k < entries.size(); k += static_cast<std::size_t>(ranks_of(comm)))
+      entries[k] = theirs[k];
+  }
+}
 
 /// Gives every rank all unstable modes, by samples.
 void share(std::vector<UnstableMode>& modes, MPI_Comm comm);

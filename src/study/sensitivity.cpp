@@ -1,7 +1,7 @@
 #include "squeal/study/sensitivity.hpp"
 
 #include "held_vectors.hpp"
-#include "sliding_basis.hpp"
+#include "squeal/reduction/sliding_basis.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -315,29 +315,18 @@ void find_number_derivatives(const SensitivityProblem& problem, const HeldVector
 void find_probe_derivatives(const SensitivityProblem& problem, const HeldVectors& vectors, const AtHeldVectors& held,
                             Sensitivity& result)
 {
-  PetscInt probes = 0;
-  check(MatGetSize(problem.probes, &probes, nullptr));
-  const Vec pattern = problem.sliding.structure.load;
-  const auto values = [&](const MultiVector& X, std::size_t j)
-  {
-    Owned<Vec> read;
-    check(MatCreateVecs(problem.probes, nullptr, read.put()));
-    check(MatMult(problem.probes, column(X, j, pattern), read));
-    return all_entries(read);
-  };
-  const std::size_t count = vectors.count();
-  for (std::size_t j = 0; j < count; ++j)
-  {
-    const std::vector<double> right_re = values(vectors.right, j), right_im = values(vectors.right, j + count),
-                              left_re = values(vectors.left, j), left_im = values(vectors.left, j + count);
-    for (std::size_t i = 0; i < static_cast<std::size_t>(probes); ++i)
+  const Eigen::MatrixXd right = whole_product(problem.probes, vectors.right),
+                        left = whole_product(problem.probes, vectors.left);
+  const auto count = static_cast<Eigen::Index>(vectors.count());
+  for (Eigen::Index j = 0; j < count; ++j)
+    for (Eigen::Index i = 0; i < right.rows(); ++i)
     {
-      const Complex unit = Complex(left_re[i], left_im[i]) * Complex(right_re[i], right_im[i]);
-      const Complex lambda = vectors.lambda[j];
-      const auto by = [&](Complex factor) { return -factor * unit / held.slopes[j]; };
-      result.modes[j].probes.push_back({by(lambda * lambda), by(lambda), by(1)});
+      const auto mode = static_cast<std::size_t>(j);
+      const Complex unit = Complex(left(i, j), left(i, j + count)) * Complex(right(i, j), right(i, j + count));
+      const Complex lambda = vectors.lambda[mode];
+      const auto by = [&](Complex factor) { return -factor * unit / held.slopes[mode]; };
+      result.modes[mode].probes.push_back({by(lambda * lambda), by(lambda), by(1)});
     }
-  }
 }
 
 /// A with `factor` times p p' of the probe's row p added.

@@ -62,19 +62,9 @@ Sweep run_in_groups(const SweepProblem& problem, const std::vector<SweepLine>& l
   std::vector<std::vector<SweepLine>> shares;
   for (int g = 0; g < groups; ++g) shares.push_back(share_of(lines, g, groups));
   Sweep own;
-  try
-  {
-    work_in_parts(comm,
-                  [&]
-                  {
-                    const Finally part = work_of_part(group.comm());
-                    own = visit(problem, group.comm(), shares[static_cast<std::size_t>(group.number())]);
-                  });
-  }
-  catch (const Interrupted&) // on all ranks, of groups that were done, too
-  {
-    own.outcome.kind = OutcomeKind::interrupted;
-  }
+  const auto visit_share = [&]
+  { own = visit(problem, group.comm(), shares[static_cast<std::size_t>(group.number())]); };
+  if (!work_in_parts(group, comm, visit_share)) own.outcome.kind = OutcomeKind::interrupted;
   Sweep whole = joined(shared(own, group, groups, comm), shares);
   whole.outcome.kind = own.outcome.kind; // the same on all ranks
   return whole;

@@ -134,24 +134,6 @@ int first_rank(int group, int groups, int ranks)
   return static_cast<int>((static_cast<long>(group) * ranks + groups - 1) / groups);
 }
 
-void work_in_parts(MPI_Comm comm, const std::function<void()>& work)
-{
-  std::exception_ptr failure;
-  try
-  {
-    work();
-  }
-  catch (const Interrupted&) // which join_parts throws on all ranks
-  {
-  }
-  catch (...)
-  {
-    failure = std::current_exception();
-  }
-  agree(comm, failure);
-  join_parts(comm);
-}
-
 int groups_of(PetscInt wanted, const SharedPoints& shared, MPI_Comm comm)
 {
   const auto [points, fewest] = shared;
@@ -170,6 +152,33 @@ RankGroup::RankGroup(MPI_Comm comm, int groups)
   const int rank = rank_of(comm), ranks = ranks_of(comm);
   while (first_rank(number_ + 1, groups, ranks) <= rank) ++number_;
   MPI_Comm_split(comm, number_, rank, &comm_);
+}
+
+bool work_in_parts(const RankGroup& group, MPI_Comm comm, const std::function<void()>& work)
+{
+  std::exception_ptr failure;
+  try
+  {
+    const Finally part = work_of_part(group.comm());
+    work();
+  }
+  catch (const Interrupted&) // which join_parts throws on all ranks
+  {
+  }
+  catch (...)
+  {
+    failure = std::current_exception();
+  }
+  agree(comm, failure);
+  try
+  {
+    join_parts(comm);
+  }
+  catch (const Interrupted&) // of groups that were done, too
+  {
+    return false;
+  }
+  return true;
 }
 
 std::vector<Sweep> shared(const Sweep& own, const RankGroup& group, int groups, MPI_Comm comm)

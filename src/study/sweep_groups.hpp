@@ -20,10 +20,6 @@ int groups_of(PetscInt wanted, const SharedPoints& shared, MPI_Comm comm);
 /// The first rank of a group; behind the last group, the number of ranks.
 int first_rank(int group, int groups, int ranks);
 
-/// Does the work of this rank's group. What any group throws ends all of them after their work; so does a request to
-/// end, as Interrupted. Collective.
-void work_in_parts(MPI_Comm comm, const std::function<void()>& work);
-
 /// The group of this rank; groups hold neighbouring ranks. Collective.
 class RankGroup
 {
@@ -40,6 +36,10 @@ private:
   int number_ = 0;
   MPI_Comm comm_ = MPI_COMM_NULL;
 };
+
+/// Does the work of this rank's group. What any group throws ends all of them after their work. Returns false on all
+/// ranks if the run was asked to end. Collective.
+bool work_in_parts(const RankGroup& group, MPI_Comm comm, const std::function<void()>& work);
 
 /// Every group's part, on every rank. Collective.
 std::vector<Sweep> shared(const Sweep& own, const RankGroup& group, int groups, MPI_Comm comm);

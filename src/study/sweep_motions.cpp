@@ -76,20 +76,8 @@ void seek_in_groups(Sweep& sweep, const std::vector<std::size_t>& places, const 
                     MPI_Comm comm)
 {
   const RankGroup group(comm, groups);
-  bool ended = false;
-  try
-  {
-    work_in_parts(comm,
-                  [&]
-                  {
-                    const Finally part = work_of_part(group.comm());
-                    seek_motions(sweep, share_of(places, group.number(), groups), problem, group.comm());
-                  });
-  }
-  catch (const Interrupted&) // on all ranks
-  {
-    ended = true;
-  }
+  const auto seek_share = [&] { seek_motions(sweep, share_of(places, group.number(), groups), problem, group.comm()); };
+  const bool ended = !work_in_parts(group, comm, seek_share);
   for (int g = 0; g < groups; ++g)
     for (const std::size_t place : share_of(places, g, groups))
     {

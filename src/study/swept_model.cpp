@@ -2,7 +2,6 @@
 
 #include "squeal/algebra/root.hpp"
 #include "squeal/contact/pairs.hpp"
-#include "squeal/study/reversed.hpp"
 
 #include <algorithm>
 #include <functional>
@@ -11,6 +10,14 @@
 
 namespace squeal
 {
+
+void reverse_rotation(Structure& structure, Interface& interface)
+{
+  for (double& velocity : interface.drive) velocity = -velocity;
+  if (!structure.G.get()) return;
+  structure.G = copy_of(structure.G); // other models may share the matrix
+  check(MatScale(structure.G, -1));
+}
 
 SweptModel::SweptModel(SweptProblem problem, MPI_Comm comm, std::function<void()> end_if_asked)
     : problem_(std::move(problem)), comm_(comm), end_if_asked_(std::move(end_if_asked)),

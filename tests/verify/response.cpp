@@ -47,7 +47,8 @@ struct Driven
     std::vector<int> all;
     for (PetscInt i = 0; i < count; ++i) all.push_back(static_cast<int>(i));
     const PencilOptions pencil;
-    return find_response({model.structure, linearised, {}, probes, all, frequencies, options, pencil});
+    return find_response(
+        {{model.structure, model.interface, equilibrium}, linearised, {}, probes, all, frequencies, options, pencil});
   }
 };
 

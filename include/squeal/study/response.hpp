@@ -39,7 +39,7 @@ struct ResponseOptions
 /// What is driven and read, and at which frequencies.
 struct ResponseProblem
 {
-  const Structure& structure;
+  SlidingEquilibrium sliding;
   const LinearisedSliding& linearised;
   std::span<const ComplexMode> modes; // known ones; may be empty
   Mat probes = nullptr;               // a row a probe

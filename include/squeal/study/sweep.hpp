@@ -31,6 +31,9 @@ struct SweptPlace
   auto operator<=>(const SweptPlace&) const = default;
 };
 
+/// Turns round the drive of the contacts, and the G that rotation brings.
+void reverse_rotation(Structure& structure, Interface& interface);
+
 /// What the chain of stages says at a point where a mode grows. outcome: of the search for a cycle, "settled" where the
 /// settled motion answers; else of the stage that ended the chain. NaN: not known.
 struct SweptMotion

@@ -1,12 +1,11 @@
-#include "sliding_basis.hpp"
+#include "squeal/reduction/sliding_basis.hpp"
 
-#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/base/petsc.hpp"
+#include "squeal/equilibrium/contact_stiffness.hpp"
+#include "squeal/modes/dense_losses.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 #include <algorithm>
-#include <array>
-#include <Eigen/Cholesky>
 
 namespace squeal
 {
@@ -42,12 +41,6 @@ std::vector<Index> dofs_with_entries(Mat B)
   return rows;
 }
 
-/// The sum over all ranks, the same to the last bit everywhere.
-MatrixXd shared_sum(const MatrixXd& local, MPI_Comm comm)
-{
-  return inner_products({comm, MatrixXd::Identity(local.rows(), local.rows())}, {comm, local});
-}
-
 /// Those of matrices that no others give.
 std::vector<BasisImage*> images_of(SlidingBasis& basis)
 {
@@ -58,19 +51,17 @@ std::vector<BasisImage*> images_of(SlidingBasis& basis)
 }
 
 /// `A` may be null. Returns whether it is another one.
-bool set_matrix(SlidingBasis& basis, BasisImage& image, Mat A)
+bool set_matrix(const SlidingBasis& basis, BasisImage& image, Mat A)
 {
   if (image.matrix.get() == A) return false;
-  basis.by_Z.Z = {};
-  if (!A)
-  {
-    image = {image.sign};
-    return true;
-  }
+  image = {image.sign};
+  if (!A) return true;
   image.matrix = shared(A);
-  const MultiVector AT = product(A, basis.T);
-  image.contact_rows = {AT.comm, AT.entries(basis.contact_dofs, Eigen::all)};
-  image.products = inner_products(basis.T, AT);
+  image.contact_rows = {basis.T.comm, MatrixXd(basis.contact_dofs.size(), basis.T.columns())};
+  const auto take_rows = [&](Index first, const MultiVector& part)
+  { image.contact_rows.entries.middleCols(first, part.columns()) = part.entries(basis.contact_dofs, Eigen::all); };
+  image.products = symmetric_inner_products(basis.T, A, take_rows);
+  if (image.sign < 0) image.products.triangularView<Eigen::StrictlyUpper>() = -image.products.transpose();
   return true;
 }
 
@@ -82,7 +73,6 @@ void set_contact(SlidingBasis& basis, Mat B)
   int changed = dofs != basis.contact_dofs;
   MPI_Allreduce(MPI_IN_PLACE, &changed, 1, MPI_INT, MPI_MAX, comm_of(B));
   basis.B = shared(B);
-  basis.by_Z.Z = {};
   if (changed == 0) return;
   basis.contact_dofs = std::move(dofs);
   basis.whole_C = {};
@@ -93,22 +83,10 @@ void set_damping(SlidingBasis& basis, Mat M, Mat C, Mat K)
 {
   basis.rayleigh = rayleigh_part(M, C, K);
   basis.C = {};
-  basis.by_Z.Z = {};
   if (basis.rayleigh)
     basis.C.matrix = shared(C);
   else
     set_matrix(basis, basis.C, C);
-}
-
-/// The pivots of this rank, as local rows.
-std::vector<Index> local_pivots(const ClosedContact& contact)
-{
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(contact.Z, &first, &last));
-  std::vector<Index> rows;
-  for (const PetscInt pivot : contact.pivots)
-    if (pivot >= first && pivot < last) rows.push_back(pivot - first);
-  return rows;
 }
 
 Owned<IS> set_of(MPI_Comm comm, const std::vector<PetscInt>& places)
@@ -128,6 +106,16 @@ Owned<IS> pivot_set(const ClosedContact& contact)
   return set_of(comm_of(contact.Z), own);
 }
 
+/// The rows that this rank has, or as many columns as it has of vectors that A multiplies.
+Owned<IS> own_range(Mat A, PetscErrorCode (*range)(Mat, PetscInt*, PetscInt*))
+{
+  PetscInt first = 0, last = 0;
+  Owned<IS> set;
+  check(range(A, &first, &last));
+  check(ISCreateStride(comm_of(A), last - first, first, 1, set.put()));
+  return set;
+}
+
 Owned<Mat> part_of(Mat A, IS rows, IS columns)
 {
   Owned<Mat> result;
@@ -135,82 +123,23 @@ Owned<Mat> part_of(Mat A, IS rows, IS columns)
   return result;
 }
 
-/// What a lift of T by a basis of the closed pairs changes, on the rows of the pivots. These rows of the lift have
-/// entries at other degrees of freedom of the contact alone.
-MultiVector change_by_lift(const SlidingBasis& basis, const ClosedContact& contact, const std::vector<Index>& pivots,
-                           Mat lift)
+/// Both lifts of a point.
+struct Lifts
 {
-  std::vector<Index> rows;
-  std::vector<PetscInt> columns;
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRangeColumn(lift, &first, &last));
-  for (std::size_t below = 0; const Index dof : basis.contact_dofs)
-  {
-    while (below < pivots.size() && pivots[below] < dof) ++below;
-    if (below < pivots.size() && pivots[below] == dof) continue;
-    rows.push_back(dof);
-    columns.push_back(first + static_cast<PetscInt>(dof) - static_cast<PetscInt>(below));
-  }
-  MultiVector change = product(part_of(lift, pivot_set(contact), set_of(comm_of(lift), columns)),
-                               {basis.T.comm, basis.T.entries(rows, Eigen::all)});
-  change.entries -= basis.T.entries(pivots, Eigen::all);
-  return change;
-}
+  Lift by_Z, by_Y;
+  Owned<IS> pivots;
+  std::vector<Index> in_contact{}; // places of the pivots among the contact's degrees of freedom
+};
 
-/// Orthonormal combinations of the shapes that hold more than a trace of other degrees of freedom than the pivots, by
-/// the inner products without these; empty: every combination does. What a lift makes of the others is rounding: its
-/// projection is singular, with any number for an eigenvalue.
-MatrixXd independent_part(const MatrixXd& kept)
+/// (T + D_Y)'A(T + D_Z); empty without a matrix.
+MatrixXd lifted(const BasisImage& image, const Lifts& lifts)
 {
-  constexpr double trace = 1e-12; // square of a part of 1e-6: rounding leaves it a relative error of 1e-10
-  const MatrixXd shifted = kept - trace * MatrixXd::Identity(kept.rows(), kept.cols());
-  if (shifted.llt().info() == Eigen::Success) return {}; // as mostly, at a tenth of the work
-  const SymmetricEigenpairs parts = solve_dense_symmetric(kept);
-  return parts.y.rightCols((parts.lambda.array() >= trace).count());
-}
-
-/// Whether two matrices have one layout and equal entries. Collective.
-bool equal(Mat A, Mat B)
-{
-  std::array<PetscInt, 2> size{}, other{};
-  check(MatGetLocalSize(A, &size[0], &size[1]));
-  check(MatGetLocalSize(B, &other[0], &other[1]));
-  int alike = size == other; // else MatEqual is an error
-  MPI_Allreduce(MPI_IN_PLACE, &alike, 1, MPI_INT, MPI_MIN, comm_of(A));
-  PetscBool same = PETSC_FALSE;
-  if (alike == 0) return false;
-  check(MatEqual(A, B, &same));
-  return same == PETSC_TRUE;
-}
-
-/// Sets the lift by Z where it has changed.
-void lift_by_Z(SlidingBasis& basis, const ClosedContact& contact)
-{
-  LiftByZ& lift = basis.by_Z;
-  if (lift.Z.get() && equal(lift.Z, contact.Z)) return;
-  lift.Z = copy_of(contact.Z);
-  PetscInt rows_of_B = 0;
-  check(MatGetSize(basis.B, &rows_of_B, nullptr));
-  if (rows_of_B > 0) lift.of_B = product(basis.B, basis.T);
-  lift.pivots = local_pivots(contact);
-  lift.in_contact.clear();
-  lift.change = change_by_lift(basis, contact, lift.pivots, contact.Z);
-  for (const Index pivot : lift.pivots)
-    lift.in_contact.push_back(std::lower_bound(basis.contact_dofs.begin(), basis.contact_dofs.end(), pivot) -
-                              basis.contact_dofs.begin());
-  const MatrixXd at_pivots = basis.T.entries(lift.pivots, Eigen::all).rightCols(basis.shapes());
-  lift.kept = MatrixXd::Identity(basis.shapes(), basis.shapes()) -
-              shared_sum(at_pivots.transpose() * at_pivots, basis.T.comm); // shapes are orthonormal
-  lift.independent = independent_part(lift.kept);
-  const Owned<IS> pivots = pivot_set(contact);
-  for (BasisImage* image : images_of(basis))
-  {
-    const MatrixXd rows = image->contact_rows.entries(lift.in_contact, Eigen::all);
-    image->lifted_rows = product(part_of(image->matrix, pivots, pivots), lift.change);
-    image->lifted_rows.entries += rows;
-    image->lifted_products =
-        image->products + image->sign * shared_sum(rows.transpose() * lift.change.entries, basis.T.comm);
-  }
+  if (!image.matrix.get()) return {};
+  const auto& [by_Z, by_Y, pivots, in_contact] = lifts;
+  const MultiVector rows{by_Z.change.comm, image.contact_rows.entries(in_contact, Eigen::all)};
+  MultiVector lifted_rows = product(part_of(image.matrix, pivots, pivots), by_Z.change);
+  lifted_rows.entries += rows.entries;
+  return image.products + image.sign * inner_products(rows, by_Z.change) + inner_products(by_Y.change, lifted_rows);
 }
 
 /// On the rows of B, symmetric or not.
@@ -222,26 +151,19 @@ struct PairMatrix
 
 /// T_Y'B'D B T_Z. Most rows of D are zero: of friction's damping those of normals and, mostly, along the drive. The
 /// others may hold no pivot: then B T_Y and B T_Z are B T there.
-MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& contact, const MultiVector& by_Y,
-                            const PairMatrix& D)
+MatrixXd projected_on_pairs(const SlidingBasis& basis, const Lifts& lifts, const PairMatrix& D)
 {
-  const Mat B = basis.B;
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(B, &first, &last));
   std::vector<PetscInt> rows;
-  std::vector<Index> places;
   for_each_row(D.matrix,
                [&](PetscInt row, std::span<const PetscInt>, std::span<const PetscScalar> values)
                {
-                 if (std::ranges::all_of(values, [](PetscScalar value) { return value == 0; })) return;
-                 rows.push_back(row);
-                 places.push_back(row - first);
+                 if (std::ranges::any_of(values, [](PetscScalar value) { return value != 0; })) rows.push_back(row);
                });
-  const Owned<IS> taken = set_of(comm_of(B), rows);
-  const Owned<Mat> D_taken = part_of(D.matrix, taken, taken), at_pivots = part_of(B, taken, pivot_set(contact));
+  const Owned<IS> taken = set_of(comm_of(basis.B), rows);
+  const Owned<Mat> D_taken = part_of(D.matrix, taken, taken), at_pivots = part_of(basis.B, taken, lifts.pivots);
+  const MultiVector sliding = product(part_of(basis.B, taken, own_range(basis.B, MatGetOwnershipRangeColumn)), basis.T);
   double entries = 0;
   check(MatNorm(at_pivots, NORM_FROBENIUS, &entries));
-  const MultiVector sliding{basis.T.comm, basis.by_Z.of_B.entries(places, Eigen::all)};
   if (entries == 0)
   {
     const MultiVector force = product(D_taken, sliding);
@@ -250,7 +172,7 @@ MatrixXd projected_on_pairs(const SlidingBasis& basis, const ClosedContact& cont
   const auto lifted = [&](const MultiVector& change) {
     return MultiVector{change.comm, sliding.entries + product(at_pivots, change).entries};
   };
-  return inner_products(lifted(by_Y), product(D_taken, lifted(basis.by_Z.change)));
+  return inner_products(lifted(lifts.by_Y.change), product(D_taken, lifted(lifts.by_Z.change)));
 }
 
 } // namespace
@@ -285,7 +207,6 @@ Index extend(SlidingBasis& basis, MultiVector X)
   MultiVector shapes = columns_from(basis.T, basis.sketched);
   const Index gained = extend_orthonormal(shapes, std::move(X)), size = basis.T.columns() + gained;
   if (gained == 0) return 0;
-  basis.by_Z.Z = {};
   const MultiVector news = columns_from(shapes, shapes.columns() - gained);
   append(basis.T, news);
   for (BasisImage* image : images_of(basis))
@@ -300,27 +221,104 @@ Index extend(SlidingBasis& basis, MultiVector X)
   return gained;
 }
 
-ProjectedSliding project(SlidingBasis& basis, const ClosedContact& contact, Mat damping, Mat stiffness)
+std::vector<Index> local_pivots(const ClosedContact& contact)
 {
-  lift_by_Z(basis, contact);
-  const MultiVector by_Y = change_by_lift(basis, contact, basis.by_Z.pivots, contact.Y);
-  const auto lifted = [&](const BasisImage& image) -> MatrixXd
+  PetscInt first = 0, last = 0;
+  check(MatGetOwnershipRange(contact.Z, &first, &last));
+  std::vector<Index> rows;
+  for (const PetscInt pivot : contact.pivots)
+    if (pivot >= first && pivot < last) rows.push_back(pivot - first);
+  return rows;
+}
+
+LinearisedPoint linearise_point(const SlidingEquilibrium& sliding)
+{
+  const auto& [structure, interface, equilibrium] = sliding;
+  LinearisedPoint point{sliding, eliminate_closed_pairs(structure, interface, equilibrium.closed)};
+  const auto part = interface.friction.common.direction_damping ? FrictionDamping::whole : FrictionDamping::of_speed;
+  point.damping = damping_of_pairs(interface, equilibrium.closed, equilibrium.reactions, part);
+  point.stiffness = stiffness_of_pairs(interface, equilibrium.closed, PairForces::with_friction);
+  return point;
+}
+
+Lift lift(const SlidingBasis& basis, const ClosedContact& contact, Mat by)
+{
+  const std::vector<Index> pivots = local_pivots(contact);
+  // rows of pivots have entries at other degrees of freedom of the contact alone
+  std::vector<Index> rows;
+  std::vector<PetscInt> columns;
+  PetscInt first = 0;
+  check(MatGetOwnershipRangeColumn(by, &first, nullptr));
+  for (std::size_t below = 0; const Index dof : basis.contact_dofs)
   {
-    if (!image.matrix.get()) return {};
-    return image.lifted_products + inner_products(by_Y, image.lifted_rows);
-  };
-  ProjectedSliding result{lifted(basis.M), {}, lifted(basis.K), lifted(basis.K_loss)};
+    while (below < pivots.size() && pivots[below] < dof) ++below;
+    if (below < pivots.size() && pivots[below] == dof) continue;
+    rows.push_back(dof);
+    columns.push_back(first + static_cast<PetscInt>(dof) - static_cast<PetscInt>(below));
+  }
+  MultiVector change = product(part_of(by, pivot_set(contact), set_of(comm_of(by), columns)),
+                               {basis.T.comm, basis.T.entries(rows, Eigen::all)});
+  change.entries -= basis.T.entries(pivots, Eigen::all);
+  return {pivots, std::move(change)};
+}
+
+Owned<Mat> at_pivots(Mat A, const ClosedContact& contact)
+{
+  return part_of(A, own_range(A, MatGetOwnershipRange), pivot_set(contact));
+}
+
+ProjectedSliding project(const SlidingBasis& basis, const LinearisedPoint& point)
+{
+  const ClosedContact& contact = point.contact;
+  Lifts lifts{lift(basis, contact, contact.Z), lift(basis, contact, contact.Y), pivot_set(contact)};
+  for (const Index pivot : lifts.by_Z.pivots)
+    lifts.in_contact.push_back(std::ranges::lower_bound(basis.contact_dofs, pivot) - basis.contact_dofs.begin());
+  ProjectedSliding result{lifted(basis.M, lifts), {}, lifted(basis.K, lifts), lifted(basis.K_loss, lifts)};
   if (basis.rayleigh)
     result.C = basis.rayleigh->of_mass * result.M + basis.rayleigh->of_stiffness * result.K;
   else
-    result.C = lifted(basis.C);
-  if (basis.G.matrix.get()) result.C += lifted(basis.G);
-  if (basis.H.matrix.get()) result.K += lifted(basis.H);
-  if (damping) result.C += projected_on_pairs(basis, contact, by_Y, {damping, true});
-  if (stiffness) result.K += projected_on_pairs(basis, contact, by_Y, {stiffness, false});
-  result.kept = basis.by_Z.kept;
-  result.independent = basis.by_Z.independent;
+    result.C = lifted(basis.C, lifts);
+  if (basis.G.matrix.get()) result.C += lifted(basis.G, lifts);
+  if (basis.H.matrix.get()) result.K += lifted(basis.H, lifts);
+  if (point.damping.get()) result.C += projected_on_pairs(basis, lifts, {point.damping, true});
+  if (point.stiffness.get()) result.K += projected_on_pairs(basis, lifts, {point.stiffness, false});
   return result;
+}
+
+MultiVector dynamic_forces(const SlidingBasis& basis, const LinearisedPoint& point, Side side, const Combinations& of)
+{
+  const auto& [structure, interface, equilibrium] = point.sliding;
+  const bool right = side == Side::right;
+  const double of_skew = right ? 1 : -1;
+  const Mat lift = right ? point.contact.Z : point.contact.Y;
+  const Owned<Mat> test = transpose_of(right ? point.contact.Y : point.contact.Z);
+  const auto lifted = [&](const Eigen::MatrixXcd& weights) { return product(lift, of.y(weights)); };
+  const auto on_pairs = [&](Mat D, const MultiVector& x)
+  {
+    const Owned<Mat> of_side = right ? copy_of(D) : transpose_of(D);
+    return product(transpose_of(interface.B), product(of_side, product(interface.B, x)));
+  };
+  // lambda^2 M x + lambda C x + K x + f K_loss x, the factors within the weights
+  const Eigen::MatrixXcd rates = of.lambda.asDiagonal() * of.weights;
+  MultiVector x = lifted(of.weights), v = lifted(rates), acceleration = lifted(of.lambda.asDiagonal() * rates);
+  MultiVector force{x.comm, MatrixXd::Zero(x.entries.rows(), x.columns())};
+  const auto add = [&](double factor, const MultiVector& part) { force.entries += factor * part.entries; };
+  if (structure.H.get()) add(of_skew, product(structure.H, x));
+  if (point.stiffness.get()) add(1, on_pairs(point.stiffness, x));
+  if (structure.K_loss.get())
+    add(1, product(structure.K_loss, lifted(of.lambda.unaryExpr(&loss_factor_of).asDiagonal() * of.weights)));
+  if (structure.G.get()) add(of_skew, product(structure.G, v));
+  if (point.damping.get()) add(1, on_pairs(point.damping, v));
+  if (basis.rayleigh)
+  {
+    x.entries += basis.rayleigh->of_stiffness * v.entries;
+    acceleration.entries += basis.rayleigh->of_mass * v.entries;
+  }
+  else
+    add(1, product(basis.C.matrix, v));
+  add(1, product(structure.K, x));
+  add(1, product(structure.M, acceleration));
+  return product(test, force);
 }
 
 MultiVector kept_rows(const MultiVector& x, const ClosedContact& contact)
