@@ -28,8 +28,7 @@ struct Arguments
   std::filesystem::path scene, output;
   std::vector<std::string> overrides;
   RunLimits limits;
-  Beginning beginning = Beginning::afresh;
-  bool dry_run = false, help = false, version = false, allow_scripts = false, force = false;
+  bool restart = false, dry_run = false, help = false, version = false, allow_scripts = false, force = false;
   std::string reference;            // page to print; empty: none
   bool options_in_variable = false; // PETSC_OPTIONS
   std::string problem;              // said after MPI is up, once
@@ -73,7 +72,7 @@ const std::array known_arguments = {
              { read_seconds("--checkpoint", value, arguments.limits.checkpoint_interval, arguments.problem); }},
     Argument{"--restart", nullptr,
              "goes on from the checkpoints of a run that ended early or was killed, if there are any",
-             [](Arguments& arguments, const std::string&) { arguments.beginning = Beginning::from_checkpoints; }},
+             [](Arguments& arguments, const std::string&) { arguments.restart = true; }},
     Argument{"--version", nullptr, "versions of squeal and of the libraries it runs on",
              [](Arguments& arguments, const std::string&) { arguments.version = true; }},
     Argument{"--help", nullptr, "this text; -help and -h as well",
@@ -293,20 +292,19 @@ int run_program(const Arguments& arguments)
     return 0;
   }
   begin_run_control(arguments.limits);
-  std::vector<std::filesystem::path> inputs; // on rank 0
+  ResultsFolder results(output, comm);
+  std::string request;
   on_rank_zero(comm,
                [&]
                {
-                 inputs = inputs_of(scene);
-                 check_outputs(scene, inputs, output);
+                 const std::vector<std::filesystem::path> inputs = inputs_of(scene);
+                 check_outputs(scene, inputs, results.place());
+                 request = request_text(scene, inputs, options);
+                 std::error_code ignored;
+                 if (!arguments.restart) std::filesystem::remove_all(results.checkpoints(), ignored);
                });
-  ResultsFolder results(output, arguments.beginning, comm);
-  const bool restart = arguments.beginning == Beginning::from_checkpoints;
-  std::string request;
-  on_rank_zero(comm, [&] { request = request_text(scene, inputs, options); });
   broadcast(request, comm);
-  on_every_rank(comm, [&] { open_checkpoints({results.checkpoints(), request, restart}); });
-  results.accept_checkpoints();
+  on_every_rank(comm, [&] { open_checkpoints({results.checkpoints(), request, arguments.restart}); });
   write_request(scene, results.run(), results.partial(), comm);
   scene.transient.save_state = results.meanwhile(scene.transient.save_state);
   scene.cycle.save_state = results.meanwhile(scene.cycle.save_state);

@@ -185,7 +185,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   report.model.memory_bytes = peak_memory(comm);
   if (code != ExitCode::interrupted) check_options_used(stages_run(report), comm);
   save();
-  results.publish(code == ExitCode::interrupted ? Checkpoints::published : Checkpoints::removed);
+  results.publish(code == ExitCode::interrupted ? Checkpoints::kept : Checkpoints::removed);
   print_table(report, scene, comm);
   print_end(report, results, comm);
   return code;

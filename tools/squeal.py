@@ -118,7 +118,7 @@ def read_report(folder):
     file = folder / "report.json"
     if not file.exists():
         raise SquealError(f"{folder} has no report.json: it is no results folder, or its run goes on or was killed; "
-                          f"what that has is in {folder}.partial")
+                          f"what that has is in {folder}/.partial")
     try:
         report = json.loads(file.read_text())
     except json.JSONDecodeError as error:

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <cstdio>
 #include <cstring>
 #include <ctime>
 #include <fcntl.h>
@@ -25,14 +24,10 @@ namespace fs = std::filesystem;
 namespace
 {
 
-constexpr const char* lock_file = "running";
-constexpr const char* partial_ending = ".partial";  // of the folder beside the place
-constexpr const char* earlier_folder = ".replaced"; // the results that are replaced, while they are
-
-bool is_result(const fs::path& name)
-{
-  return std::find(words_of<ResultFile>.begin(), words_of<ResultFile>.end(), name) != words_of<ResultFile>.end();
-}
+// Names in the place while a run is at work.
+constexpr const char* lock_file = ".running";
+constexpr const char* partial_folder = ".partial";   // results of a run that goes on
+constexpr const char* finished_folder = ".finished"; // results that are moved to their place
 
 /// "2026-01-31T12:00:00.123456Z HOST 4711": time, machine and process tell any two runs apart.
 std::string new_identity()
@@ -55,36 +50,6 @@ std::string new_identity()
               "); name a folder you may write to with --output DIR");
 }
 
-/// Refuses a place that another folder beside it cannot replace.
-void refuse_fixed(const fs::path& place)
-{
-  struct stat own = {}, parent = {};
-  const fs::path above = place.parent_path();
-  if (stat(above.c_str(), &parent) != 0) return; // it will be made
-  if (access(above.c_str(), W_OK) != 0) refuse_folder(place, above.string() + ": " + std::strerror(errno));
-  if (stat(place.c_str(), &own) != 0) return;
-  if (own.st_dev != parent.st_dev) refuse_folder(place, "results replace the folder, and this one is a mount point");
-  if (std::error_code none; fs::equivalent(place, fs::current_path(), none))
-    refuse_folder(place, "results replace the folder, and this one is the working folder");
-}
-
-bool holds_only_results(const fs::path& folder)
-{
-  const fs::directory_iterator entries(folder);
-  return std::all_of(begin(entries), end(entries),
-                     [](const fs::directory_entry& entry) { return is_result(entry.path().filename()); });
-}
-
-/// Refuses a partial folder that no run has made: what it holds would be removed.
-void refuse_foreign(const fs::path& partial)
-{
-  if (fs::is_symlink(partial)) refuse_folder(partial, "it is a link, and runs work in a folder of this name");
-  if (!fs::exists(partial) || fs::exists(partial / lock_file)) return;
-  if (!fs::is_directory(partial)) refuse_folder(partial, "it is no folder, and runs work in one of this name");
-  if (!holds_only_results(partial))
-    refuse_folder(partial, "runs work in a folder of this name, and it holds files of another origin");
-}
-
 /// The absolute path without links, dots and a slash at its end.
 fs::path resolved(const fs::path& path)
 {
@@ -92,27 +57,16 @@ fs::path resolved(const fs::path& path)
   return whole.has_filename() ? whole : whole.parent_path();
 }
 
-[[noreturn]] void refuse_move(const fs::path& from, const fs::path& to, const std::string& reason)
-{
-  throw Error("cannot move " + from.string() + " to " + to.string() + ": " + reason +
-              "; the results stay where they are");
-}
-
-void rename_or_throw(const fs::path& from, const fs::path& to)
-{
-  if (std::rename(from.c_str(), to.c_str()) != 0) refuse_move(from, to, std::strerror(errno));
-}
-
 } // namespace
 
-std::string ResultsFolder::lock(const fs::path& folder)
+std::string ResultsFolder::lock()
 {
-  const fs::path path = folder / lock_file;
+  const fs::path path = place_ / lock_file;
   struct flock whole = {};
   whole.l_type = F_WRLCK;
   whole.l_whence = SEEK_SET;
   file_ = open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
-  if (file_ < 0) refuse_folder(folder, std::strerror(errno));
+  if (file_ < 0) refuse_folder(place_, std::strerror(errno));
   // a file system without locks refuses otherwise: there two runs into one folder go unseen
   if (fcntl(file_, F_OFD_SETLK, &whole) != 0 && (errno == EAGAIN || errno == EACCES))
   {
@@ -120,16 +74,16 @@ std::string ResultsFolder::lock(const fs::path& folder)
     const ssize_t size = read(file_, holder.data(), holder.size() - 1);
     return size > 0 ? holder.data() : "unknown";
   }
-  // a run that ended meanwhile has moved its folder away: the file locked is then another one's
+  // a run that ended meanwhile has removed its file: the file locked is then not the one that others see
   struct stat locked = {}, there = {};
   if (fstat(file_, &locked) != 0 || stat(path.c_str(), &there) != 0 || locked.st_ino != there.st_ino)
     return "one that is just ending";
   if (ftruncate(file_, 0) != 0 || write(file_, run_.data(), run_.size()) < 0)
-    refuse_folder(folder, std::strerror(errno));
+    refuse_folder(place_, std::strerror(errno));
   return {};
 }
 
-ResultsFolder::ResultsFolder(const fs::path& place, Beginning beginning, MPI_Comm comm) : comm_(comm)
+ResultsFolder::ResultsFolder(const fs::path& place, MPI_Comm comm) : comm_(comm)
 {
   on_rank_zero(comm,
                [&]
@@ -137,7 +91,7 @@ ResultsFolder::ResultsFolder(const fs::path& place, Beginning beginning, MPI_Com
                  try
                  {
                    place_ = resolved(place);
-                   make(beginning);
+                   make();
                  }
                  catch (const std::exception& failure)
                  {
@@ -153,40 +107,22 @@ ResultsFolder::ResultsFolder(const fs::path& place, Beginning beginning, MPI_Com
   partial_ = partial_text;
 }
 
-void ResultsFolder::make(Beginning beginning)
+void ResultsFolder::make()
 {
   run_ = new_identity();
-  if (fs::exists(place_) && (!fs::is_directory(place_) || access(place_.c_str(), W_OK) != 0))
-    refuse_folder(place_, fs::is_directory(place_) ? std::strerror(EACCES) : std::strerror(ENOTDIR));
-  if (place_.extension() == partial_ending)
-    refuse_folder(place_, std::string("runs into a folder without ") + partial_ending + " use this name meanwhile");
-  if (fs::is_symlink(place_)) refuse_folder(place_, "it is a link to what does not exist");
-  for (fs::path above = place_.parent_path(); above.has_relative_path(); above = above.parent_path())
-    if (above.extension() == partial_ending && fs::exists(above / lock_file))
-      refuse_folder(place_, "a run works in " + above.string());
-  refuse_fixed(place_);
-  const fs::path partial = place_.string() + partial_ending;
-  fs::create_directories(partial.parent_path());
-  refuse_foreign(partial);
-  if (fs::create_directory(partial)) partial_ = partial; // to be removed if it cannot be locked
-  const std::string holder = lock(partial);
-  partial_.clear();
+  const fs::path partial = place_ / partial_folder, finished = place_ / finished_folder;
+  made_ = fs::create_directories(place_);
+  for (const fs::path& folder : {partial, finished})
+    if (fs::exists(folder) && !fs::exists(place_ / lock_file))
+      refuse_folder(folder, "runs work in a folder of this name, and no run has made this one");
+  const std::string holder = lock();
   if (!holder.empty())
     throw Error("another run writes into " + place_.string() + " (" + holder +
                 ": its start, machine and process); wait for its end, or name another folder with --output DIR");
-  if (const fs::path earlier = partial / earlier_folder; fs::exists(earlier)) // a run was killed in publish
-  {
-    if (fs::exists(place_)) refuse_folder(place_, earlier.string() + " holds its earlier results: move them away");
-    rename_or_throw(earlier, place_);
-  }
   partial_ = partial; // from here on it is ours to remove
-  remove_earlier();
-  const bool goes_on = beginning == Beginning::from_checkpoints;
-  for (const auto& entry : fs::directory_iterator(partial_))
-    if (entry.path().filename() != lock_file && !(goes_on && entry.path() == checkpoints()))
-      fs::remove_all(entry.path());
-  copied_ = goes_on && !fs::exists(checkpoints()) && fs::exists(place_ / checkpoints().filename());
-  if (copied_) fs::copy(place_ / checkpoints().filename(), checkpoints(), fs::copy_options::recursive);
+  if (fs::exists(finished)) move_finished();
+  fs::remove_all(partial);
+  fs::create_directory(partial);
 }
 
 ResultsFolder::~ResultsFolder()
@@ -198,8 +134,9 @@ ResultsFolder::~ResultsFolder()
 void ResultsFolder::undo()
 {
   std::error_code ignored;
-  if (!partial_.empty() && !copied_ && fs::exists(checkpoints(), ignored)) return; // --restart goes on from them
   if (!partial_.empty()) fs::remove_all(partial_, ignored);
+  if (!partial_.empty()) fs::remove(place_ / lock_file, ignored);
+  if (made_) fs::remove(place_, ignored); // unless checkpoints are in it
 }
 
 std::string ResultsFolder::keep_finished()
@@ -217,17 +154,26 @@ fs::path ResultsFolder::meanwhile(const fs::path& file) const
   return inside.empty() || *inside.begin() == ".." || inside.has_parent_path() ? file : partial_ / inside;
 }
 
-/// Removes the results that were replaced, here or by a run that was killed meanwhile. Files of another origin, such as
-/// pictures, are taken along.
-void ResultsFolder::remove_earlier()
+/// Goes on where a run that was killed meanwhile had come: the earlier report goes before any result is moved, the new
+/// one comes last.
+void ResultsFolder::move_finished()
 {
-  const fs::path earlier = place_ / earlier_folder;
-  std::error_code failed;
+  const fs::path from = place_ / finished_folder, report = word(ResultFile::report);
+  if (fs::exists(place_ / report)) // then nothing has been moved yet
+    for (const fs::path name : words_of<ResultFile>)
+      if (name != report && name != word(ResultFile::checkpoints) && !fs::exists(from / name))
+        fs::remove_all(place_ / name);
+  fs::remove(place_ / report);
   std::vector<fs::path> names;
-  for (const auto& entry : fs::directory_iterator(earlier, failed)) names.push_back(entry.path().filename());
+  for (const auto& entry : fs::directory_iterator(from))
+    if (entry.path().filename() != report) names.push_back(entry.path().filename());
+  names.push_back(report);
   for (const fs::path& name : names)
-    if (!is_result(name) && !fs::exists(place_ / name) && !failed) fs::rename(earlier / name, place_ / name, failed);
-  if (!failed) fs::remove_all(earlier, failed); // else the next run tries again
+  {
+    if (fs::is_directory(place_ / name)) fs::remove_all(place_ / name);
+    fs::rename(from / name, place_ / name);
+  }
+  fs::remove(from);
 }
 
 void ResultsFolder::publish(Checkpoints checkpoints)
@@ -235,30 +181,30 @@ void ResultsFolder::publish(Checkpoints checkpoints)
   on_rank_zero(comm_,
                [&]
                {
-                 published_ = true; // whatever happens: the results are whole
+                 fs::path whole = partial_;
                  try
                  {
-                   if (fs::exists(place_) && !fs::is_directory(place_))
-                     refuse_move(partial_, place_, std::strerror(ENOTDIR)); // it has come there meanwhile
+                   fs::rename(partial_, place_ / finished_folder);
+                   whole = place_ / finished_folder;
                    if (checkpoints == Checkpoints::removed) fs::remove_all(this->checkpoints());
-                   if (fs::exists(place_)) rename_or_throw(place_, partial_ / earlier_folder);
-                   rename_or_throw(partial_, place_);
-                   remove_earlier();
+                   move_finished();
+                   fs::remove(place_ / lock_file);
                  }
                  catch (const fs::filesystem_error& error)
                  {
-                   refuse_move(partial_, place_, error.code().message());
+                   published_ = true; // they are whole, wherever they are
+                   throw Error("cannot move the results to " + place_.string() + ": " + error.code().message() +
+                               "; they stay in " + whole.string());
                  }
-                 std::error_code ignored;
-                 fs::remove(place_ / lock_file, ignored);
                });
   published_ = true;
 }
 
 bool is_used_meanwhile(const fs::path& file, const fs::path& place)
 {
-  if (file.parent_path() != place) return file == place.string() + partial_ending;
-  return file.filename() == lock_file || file.filename() == earlier_folder || file.extension() == unfinished_ending;
+  const fs::path name = file.filename();
+  return file.parent_path() == place && (name == lock_file || name == partial_folder || name == finished_folder ||
+                                         name.extension() == unfinished_ending);
 }
 
 bool is_same_file(const fs::path& a, const fs::path& b)
@@ -306,9 +252,6 @@ std::vector<fs::path> inputs_of(const Scene& scene)
 
 void check_outputs(const Scene& scene, const std::vector<fs::path>& inputs, const fs::path& place)
 {
-  std::error_code failed;
-  if (!fs::exists(place, failed) && failed) // a name that is too long, a link to itself
-    throw Error("the output " + shortened(place) + ": " + failed.message() + ": name another folder with --output DIR");
   std::vector<fs::path> results;
   for (const char* name : words_of<ResultFile>)
     if (results.push_back(place / name); results.back().has_extension() && is_folder(results.back()))

@@ -57,7 +57,7 @@ def test_a_run_of_other_arguments_or_inputs_is_not_done(tmp_path):
 def test_a_signal_ends_a_job_and_the_next_start_goes_on(tmp_path):
     run = job(tmp_path, "long_run.sh", wait=False, PERIODS="100000")
     end = time.time() + 30
-    while not (tmp_path / "estimate.partial" / "history.h5").exists() and time.time() < end:
+    while not (tmp_path / "estimate" / ".partial" / "history.h5").exists() and time.time() < end:
         time.sleep(0.05)
     time.sleep(0.5)
     run.terminate()
@@ -136,7 +136,7 @@ def test_many_runs_end_in_order_and_go_on(tmp_path):
     knobs = {"KEY": "friction.coefficient", "VALUES": "0.3 0.4 0.5", "SIDE": "2"}
     run = job(tmp_path, "many_runs.sh", wait=False, arguments=["--set", "cycle.enabled=false", "--set", "transient.periods=100000"], **knobs)
     end = time.time() + 60
-    while len(list(tmp_path.glob("*.partial/history.h5"))) < 2 and time.time() < end:
+    while len(list(tmp_path.glob("*/.partial/history.h5"))) < 2 and time.time() < end:
         time.sleep(0.05)
     run.terminate()
     run.communicate(timeout=60)

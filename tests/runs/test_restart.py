@@ -57,7 +57,7 @@ def wait_for(condition, seconds=60):
 
 
 def partial(output):
-    return output.parent / (output.name + ".partial")
+    return output / ".partial"
 
 
 def numbers(value):
@@ -275,11 +275,11 @@ def test_the_time_limit_ends_a_cycle_and_restart_ends_it(straight, tmp_path):
 def test_a_killed_run_goes_on_to_the_straight_runs_numbers(straight, tmp_path, seconds):
     output = tmp_path / "killed"
     run = start(output, *TRANSIENT_AND_CYCLE, "--checkpoint", "0.1")
-    wait_for(lambda: (partial(output) / "checkpoint").exists())
+    wait_for(lambda: (output / "checkpoint").exists())
     time.sleep(seconds)
     run.kill()
     run.wait()
-    ended = output.exists()  # before it was killed
+    ended = (output / "report.json").exists()  # before it was killed
     assert partial(output).exists() or ended
     again = start(output, *TRANSIENT_AND_CYCLE, "--restart")
     printed, errors = again.communicate(timeout=100)
@@ -309,7 +309,7 @@ def test_each_stage_goes_on(tmp_path, stage):
     assert whole.communicate(timeout=200)[0] and whole.returncode == 0
     with open(log, "w") as printed:
         run = start(output, *arguments, "--checkpoint", "0.05", scene=scene, stdout=printed)
-        wait_for(lambda: (partial(output) / "checkpoint" / sign).exists() or sign in log.read_text(), 60)
+        wait_for(lambda: (output / "checkpoint" / sign).exists() or sign in log.read_text(), 60)
         time.sleep(0.2)
         run.kill()
         run.wait()
@@ -327,7 +327,7 @@ def test_two_ranks_go_on_too(converged, tmp_path):
     scene, *settings = arguments
     output = tmp_path / "ended"
     run = start(output, *settings, "--checkpoint", "0.1", ranks=2, scene=scene)
-    wait_for(lambda: (partial(output) / "checkpoint" / "transient").exists())  # in the transient, however fast the machine
+    wait_for(lambda: (output / "checkpoint" / "transient").exists())  # in the transient, however fast the machine
     run.send_signal(signal.SIGUSR1)
     run.communicate(timeout=100)
     assert run.returncode == 3 and (output / "checkpoint" / "transient").exists()
@@ -340,13 +340,13 @@ def test_two_ranks_go_on_too(converged, tmp_path):
 def test_checkpoints_of_another_scene_are_refused_and_kept(tmp_path):
     output = tmp_path / "results"
     run = start(output, *ENDLESS, "--checkpoint", "0.1")
-    wait_for(lambda: (partial(output) / "checkpoint" / "transient").exists())
+    wait_for(lambda: (output / "checkpoint" / "transient").exists())
     run.kill()
     run.wait()
     other = start(output, *ENDLESS, "--restart", "--set", "friction.coefficient=0.31")
     errors = other.communicate(timeout=60)[1]
     assert other.returncode == 1 and "another scene" in errors and len(errors.strip().splitlines()) == 1
-    assert (partial(output) / "checkpoint" / "transient").exists()
+    assert (output / "checkpoint" / "transient").exists()
 
 
 @pytest.mark.parametrize("changed", ["a friction", "a matrix", "a mesh"])
@@ -357,7 +357,7 @@ def test_a_restart_that_is_refused_leaves_the_results_as_they_were(squeal, tmp_p
     given = [*ENDLESS, "--set", "transient.enabled=true", "--set", "transient.start=mode", *(PIN[1:] if changed == "a mesh" else [])]
     output = tmp_path / "results"
     run = start(output, *given, "--checkpoint", "0.1", scene=scene)
-    wait_for(lambda: (partial(output) / "checkpoint" / "transient").exists(), 60)
+    wait_for(lambda: (output / "checkpoint" / "transient").exists(), 60)
     run.send_signal(signal.SIGTERM)
     assert run.communicate(timeout=60) and run.returncode == 3
     if changed == "a matrix":

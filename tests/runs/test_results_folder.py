@@ -35,7 +35,7 @@ def endless(tmp_path):
 
     def begin(output, *arguments):
         runs.append(start(output, *ENDLESS, *arguments))
-        wait_for(lambda: (output.parent / (output.name + ".partial") / "history.h5").exists())
+        wait_for(lambda: (output / ".partial" / "history.h5").exists())
         return runs[-1]
 
     yield begin
@@ -54,18 +54,18 @@ def test_earlier_results_stay_when_a_run_is_killed(converged, endless, tmp_path)
     run = endless(output)
     run.send_signal(signal.SIGKILL)
     run.wait()
-    assert contents(output) == before
+    assert contents(output) == {**before, ".running": contents(output)[".running"]}
     assert converged(SCENE, *SHORT, "--output", output, ranks=1).code == 0  # the lock of the dead one is no obstacle
     after = contents(output)
     assert set(after) == set(before) and after["report.json"] != before["report.json"]
-    assert not list(tmp_path.glob("*.partial"))
+    assert not (output / ".partial").exists()
 
 
 def test_a_second_run_into_the_same_folder_is_refused(squeal, endless, tmp_path):
     endless(tmp_path / "results")
     second = squeal(SCENE, *SHORT, "--output", tmp_path / "results")
     assert second.code == 1 and len(second.messages) == 1 and "another run" in second.messages[0]
-    assert (tmp_path / "results.partial" / "options.txt").exists()
+    assert (tmp_path / "results" / ".partial" / "options.txt").exists()
 
 
 def test_every_file_names_its_run_and_tools_refuse_a_mixture(converged):
@@ -85,36 +85,33 @@ def test_every_file_names_its_run_and_tools_refuse_a_mixture(converged):
     assert subprocess.run(plot, capture_output=True).returncode == 0
 
 
-def test_the_working_folder_is_refused_and_keeps_the_users_files(tmp_path):
+def test_the_working_folder_may_be_the_place_and_keeps_the_users_files(tmp_path):
     shutil.copy(SCENE, tmp_path)
     (tmp_path / "notes.txt").write_text("mine")
-    done = subprocess.run([os.environ["SQUEAL"], "scene.toml", "--output", ".", *SHORT], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 1 and "this one is the working folder" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
-    assert {file.name for file in tmp_path.iterdir()} == {"scene.toml", "notes.txt"}
-    assert not list(tmp_path.parent.glob(tmp_path.name + "?*"))
+    for _ in range(2):
+        done = subprocess.run([os.environ["SQUEAL"], "scene.toml", "--output", ".", *SHORT], cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    names = {"report.json", "history.h5", "fields.h5", "fields.xdmf", "resolved.toml", "options.txt"}
+    assert {file.name for file in tmp_path.iterdir()} == names | {"scene.toml", "notes.txt"}
+    assert (tmp_path / "notes.txt").read_text() == "mine" and (tmp_path / "scene.toml").read_bytes() == SCENE.read_bytes()
 
 
-@pytest.mark.parametrize("killed", ["before the new results had the place", "before the earlier ones were gone"])
-def test_a_kill_between_the_moves_loses_nothing(converged, tmp_path, killed):
-    """The next run ends the move."""
-    output = converged(SCENE, *SHORT, ranks=1).output
+@pytest.mark.parametrize("moved", [None, 0, 3])
+def test_a_kill_between_the_moves_loses_nothing(converged, squeal, tmp_path, moved):
+    """The next run ends the move, here one that does not get further. `moved`: files, of which the earlier report is gone before the first."""
+    output, finished = (converged(SCENE, *SHORT, ranks=1).output for _ in range(2))
     (output / "energy.png").write_text("a picture")
-    if killed.startswith("before the new"):
-        partial = output.parent / (output.name + ".partial")
-        partial.mkdir()
-        (partial / "running").write_text("a run")
-        output.rename(partial / ".replaced")
-    else:
-        earlier = tmp_path / "earlier"
-        output.rename(earlier)
-        shutil.copytree(earlier, output)
-        (output / "energy.png").unlink()
-        earlier.rename(output / ".replaced")
-    run = json.loads((output / "report.json" if output.exists() else partial / ".replaced" / "report.json").read_text())["run"]
-    converged(SCENE, *SHORT, "--output", output, ranks=1)
-    assert (output / "energy.png").read_text() == "a picture"
-    assert json.loads((output / "report.json").read_text())["run"] != run
-    assert not (output / ".replaced").exists() and not list(output.parent.glob("*.partial"))
+    (output / "sweep.csv").write_text("of the earlier run")
+    expected = contents(finished) | {"energy.png": b"a picture"}
+    (output / ".running").write_text("a run")
+    finished = finished.rename(output / ".finished")
+    if moved is not None:
+        (output / "sweep.csv").unlink()
+        (output / "report.json").unlink()
+        for name in sorted(set(expected) - {"energy.png", "report.json"})[:moved]:
+            (finished / name).rename(output / name)
+    assert squeal(SCENE, "--output", output, "--set", f"transient.save_state={output}/history.h5", ranks=1).code == 1
+    assert contents(output) == expected and not finished.exists() and not (output / ".partial").exists()
 
 
 def test_a_state_inside_the_results_comes_with_them(converged, tmp_path):
@@ -154,13 +151,13 @@ def make_folder_of_a_file(tmp_path):
 def make_link(tmp_path):
     (tmp_path / "victim").mkdir()
     (tmp_path / "victim" / "report.json").write_text("mine")
-    (tmp_path / "out.partial").symlink_to(tmp_path / "victim")
+    (tmp_path / "out" / ".partial").symlink_to(tmp_path / "victim")
     return []
 
 
 def make_foreign_partial(tmp_path):
-    (tmp_path / "out.partial").mkdir()
-    (tmp_path / "out.partial" / "mine.txt").write_text("precious")
+    (tmp_path / "out" / ".partial").mkdir()
+    (tmp_path / "out" / ".partial" / "mine.txt").write_text("precious")
     return []
 
 
@@ -180,21 +177,13 @@ def make_link_to_nothing(tmp_path):
     return ["--output", tmp_path / "link"]
 
 
-def make_place_inside_anothers_meantime(tmp_path):
-    (tmp_path / "other.partial").mkdir()
-    (tmp_path / "other.partial" / "running").write_text("a run")
-    return ["--output", tmp_path / "other.partial" / "out"]
-
-
 REFUSED = {"a pipe": (make_device, "pipe"), "a folder of a file's name": (make_folder_of_a_file, "history.h5 is a folder"),
-           "a link": (make_link, "it is a link"), "a folder of another origin": (make_foreign_partial, "another origin"),
+           "a link": (make_link, "no run has made"), "a folder of another origin": (make_foreign_partial, "no run has made"),
            "a folder of a result's name": (make_matrices_of_a_results_name, "no run has made"),
            "matrices in a result's place": (make_scene_on_matrices_of_a_results_name, "fall on"),
-           "a link to nothing": (make_link_to_nothing, "a link to"),
-           "a place inside another run's": (make_place_inside_anothers_meantime, "a run works in"),
-           "a state of the lock's name": (lambda tmp_path: ["--set", f"transient.save_state={tmp_path}/out/running"], "this name meanwhile"),
-           "a state on the meantime": (lambda tmp_path: ["--set", f"transient.save_state={tmp_path}/out.partial"], "this name meanwhile"),
-           "another run's meantime": (lambda tmp_path: ["--output", tmp_path / "x.partial"], "use this name meanwhile"),
+           "a link to nothing": (make_link_to_nothing, "File exists"),
+           "a state of the lock's name": (lambda tmp_path: ["--set", f"transient.save_state={tmp_path}/out/.running"], "this name meanwhile"),
+           "a state on the meantime": (lambda tmp_path: ["--set", f"transient.save_state={tmp_path}/out/.partial"], "this name meanwhile"),
            "a log on the scene": (lambda tmp_path: ["-log_view", f":{SCENE}"], "fall on the scene"),
            "a log on a result": (lambda tmp_path: ["-history", tmp_path / "out" / "report.json"], "report.json")}
 
@@ -212,15 +201,14 @@ def test_nothing_of_the_users_is_replaced(squeal, tmp_path, name):
     assert before == (sorted(tmp_path.rglob("*")), files_below(tmp_path), SCENE.read_bytes())
 
 
-def test_pictures_stay_where_the_folder_is_replaced(converged):
+def test_files_of_another_origin_stay_and_results_of_other_stages_go(converged):
     output = converged(SCENE, *SHORT, ranks=1).output
     (output / "energy.png").write_text("a picture")
     (output / "notes").mkdir()
-    folder = output.stat().st_ino
+    (output / "sweep.csv").write_text("of the earlier run")
     converged(SCENE, *SHORT, "--output", output, ranks=1)
-    assert output.stat().st_ino != folder  # the folder itself was replaced
     assert (output / "energy.png").read_text() == "a picture" and (output / "notes").is_dir()
-    assert not list(output.parent.glob("*.partial"))
+    assert not (output / "sweep.csv").exists() and not list(output.glob(".*"))
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
@@ -237,15 +225,6 @@ def test_a_reader_that_is_gone_costs_no_results(tmp_path, ranks):
     assert run.returncode == 0 or ranks == 2
 
 
-def test_a_file_that_comes_into_the_place_meanwhile_stays_and_so_do_the_results(endless, tmp_path):
-    run = endless(tmp_path / "results")
-    (tmp_path / "results").write_text("mine")
-    run.send_signal(signal.SIGTERM)
-    errors = run.communicate(timeout=60)[1]
-    assert run.returncode == 1 and "the results stay where they are" in errors and len(errors.splitlines()) == 1, errors
-    assert (tmp_path / "results").read_text() == "mine" and (tmp_path / "results.partial" / "report.json").exists()
-
-
 def files_below(folder):
     return {file.relative_to(folder): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
 
@@ -257,7 +236,7 @@ def test_no_room_for_a_file_is_one_message_and_leaves_the_folder_as_it_was(conve
     converged(SCENE, *SHORT, "--output", output, ranks=1)
     before = files_below(tmp_path)
     run = start(output, "--set", "transient.periods=200", "--set", "cycle.enabled=false")  # a history of 6 MB
-    wait_for(lambda: (tmp_path / "results.partial" / "options.txt").exists())
+    wait_for(lambda: (tmp_path / "results" / ".partial" / "options.txt").exists())
     resource.prlimit(run.pid, resource.RLIMIT_FSIZE, (size, size))
     errors = run.communicate()[1]
     assert run.returncode == 1, errors

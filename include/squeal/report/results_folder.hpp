@@ -1,9 +1,7 @@
 #pragma once
-/// The results of a run as one whole. Stages write into a folder beside the results' place, PLACE.partial. When the run
-/// ends, the earlier results move into it and it takes the place; then the earlier ones are removed, but for files of
-/// another origin. A run that is killed between leaves both, and the next one ends the move.
-///
-/// A working folder, a mount point and a folder whose parent is read-only cannot be replaced so, and are refused.
+/// The results of a run as one whole. Stages write into PLACE/.partial. When the run ends, that folder becomes
+/// PLACE/.finished, and its files take the place of the earlier ones, the report last. What a run that is killed
+/// meanwhile leaves there, the next run moves. Files of another origin stay.
 #include "squeal/base/words.hpp"
 #include "squeal/scene/scene.hpp"
 
@@ -33,28 +31,20 @@ template <> inline constexpr std::array words_of<ResultFile> = {
     "report.json", "history.h5",    "sweep.csv",   "sweep_motions.csv", "robustness.csv", "fields.h5",
     "fields.xdmf", "resolved.toml", "options.txt", "reduced",           "checkpoint"};
 
-/// Whether the run keeps checkpoints.
+/// What becomes of the checkpoints of a run that ends.
 enum class Checkpoints
 {
   removed,
-  published,
+  kept, // it can go on
 };
 
-/// Whether the run starts anew.
-enum class Beginning
-{
-  afresh,
-  from_checkpoints,
-};
-
-/// The place of the results and the folder that takes it.
+/// The place of the results, where one run is at work.
 class ResultsFolder
 {
 public:
-  /// Makes and locks the partial folder; what a run that was killed left there is removed, but for the checkpoints to
-  /// go on from. Where it left none, those of the results in the place are taken. Collective. Error: the folder cannot
-  /// be written, or another run is at work in it.
-  ResultsFolder(const std::filesystem::path& place, Beginning beginning, MPI_Comm comm);
+  /// Makes and locks the folder; what a run that was killed left there is moved if it is whole, else removed.
+  /// Collective. Error: the folder cannot be written, or another run is at work in it.
+  ResultsFolder(const std::filesystem::path& place, MPI_Comm comm);
 
   /// Without publish, leaves everything as it was before, but for checkpoints and what keep_finished keeps.
   ~ResultsFolder();
@@ -68,12 +58,9 @@ public:
   /// Where a file of the user's own name is written meanwhile: in the partial folder if it belongs into the place.
   std::filesystem::path meanwhile(const std::filesystem::path& file) const;
 
-  /// From here on the checkpoints outlive a failure; before, those copied from the place are removed again.
-  void accept_checkpoints() { copied_ = false; }
+  std::filesystem::path checkpoints() const { return place_ / word(ResultFile::checkpoints); }
 
-  std::filesystem::path checkpoints() const { return partial_ / word(ResultFile::checkpoints); }
-
-  /// Moves the results to their place, with their checkpoints if the run can go on. Collective.
+  /// Moves the results to their place. Collective.
   void publish(Checkpoints checkpoints);
 
   /// Leaves the partial folder where it is if a stage has written its results. Returns the end of a sentence that says
@@ -81,16 +68,17 @@ public:
   std::string keep_finished();
 
 private:
-  void make(Beginning beginning);                        // on rank 0
-  std::string lock(const std::filesystem::path& folder); // returns who holds it; empty: it is this process now
-  void remove_earlier();                                 // on rank 0
-  void undo();                                           // on rank 0
+  // on rank 0
+  void make();
+  std::string lock(); // returns who holds it; empty: it is this process now
+  void move_finished();
+  void undo();
 
   MPI_Comm comm_;
   std::filesystem::path place_, partial_;
   std::string run_;
   int file_ = -1; // holds a lock as long as the process lives; the system frees that of one that died
-  bool published_ = false, kept_ = false, copied_ = false;
+  bool made_ = false, published_ = false, kept_ = false;
 };
 
 /// The files and folders that the scene names as inputs, its own file first. Files that a geometry includes or merges
