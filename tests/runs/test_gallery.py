@@ -15,6 +15,7 @@ NUMBERS = [
     ("loss_factors", "sweep.thresholds.0.values.0", 0.09971377),
     ("compliance", "sweep.thresholds.0.values.0", 1.734422e-12),
     ("orthotropic", "modes.modes.0.growth_rate", 182.1206),
+    ("superelement", "sweep.thresholds.0.values.0", 0.2276006),
 ]
 
 
