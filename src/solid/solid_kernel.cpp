@@ -27,7 +27,7 @@ namespace
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-/// Strains xx yy zz xy yz zx along the axes of R's rows, of unit strains along x, y and z.
+/// SolidStrains xx yy zz xy yz zx along the axes of R's rows, of unit strains along x, y and z.
 Matrix6 strain_rotation(const Eigen::Matrix3d& R)
 {
   constexpr std::array<std::array<Eigen::Index, 2>, 6> at = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}}};
@@ -70,15 +70,15 @@ Matrix6 elasticity(const Material& material)
   return D;
 }
 
-using Gradients = Eigen::Matrix3Xd;                       // one function a column
-using Strains = Eigen::Matrix<double, 6, Eigen::Dynamic>; // of unit displacements, one a column
+using SolidGradients = Eigen::Matrix3Xd;                       // one function a column
+using SolidStrains = Eigen::Matrix<double, 6, Eigen::Dynamic>; // of unit displacements, one a column
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Returns the strains of displacements whose gradients in x, y, z are the columns of g.
-Strains strains_of(const Gradients& g)
+SolidStrains strains_of(const SolidGradients& g)
 {
-  Strains B(6, 3 * g.cols());
+  SolidStrains B(6, 3 * g.cols());
   for (Eigen::Index i = 0; i < g.cols(); ++i)
   {
     const double x = g(0, i), y = g(1, i), z = g(2, i);
@@ -94,9 +94,9 @@ Eigen::Index modes_of(Shape shape)
 }
 
 /// Returns the natural gradients of the incompatible modes, one a column.
-Gradients mode_gradients(Shape shape, const Eigen::Vector3d& xi)
+SolidGradients mode_gradients(Shape shape, const Eigen::Vector3d& xi)
 {
-  Gradients g = Gradients::Zero(3, modes_of(shape));
+  SolidGradients g = SolidGradients::Zero(3, modes_of(shape));
   if (shape == Shape::hex8) g.diagonal() = -2 * xi;
   if (shape == Shape::wedge6)
     g << 2 * xi(0) - 1, 0, xi(1), 0, /**/ 0, 2 * xi(1) - 1, xi(0), 0, /**/ 0, 0, 0, -2 * xi(2);
@@ -109,7 +109,7 @@ Eigen::Vector3d centre_of_reference(Shape shape)
 }
 
 /// Less their mean over the reference element, which is their value at its centre.
-Gradients mode_gradients_without_mean(Shape shape, const Eigen::Vector3d& xi)
+SolidGradients mode_gradients_without_mean(Shape shape, const Eigen::Vector3d& xi)
 {
   return mode_gradients(shape, xi) - mode_gradients(shape, centre_of_reference(shape));
 }
@@ -126,14 +126,14 @@ VectorXd mode_values(Shape shape, const Eigen::Vector3d& xi)
 /// Strain operators of an element.
 struct Kinematics
 {
-  std::vector<StrainPoint<Strains>> points; // of the stiffness rule
-  MatrixXd amplitudes;                      // of unit nodal displacements: row 3 k + component of mode k
+  std::vector<StrainPoint<SolidStrains>> points; // of the stiffness rule
+  MatrixXd amplitudes;                           // of unit nodal displacements: row 3 k + component of mode k
 };
 
 Kinematics kinematics(Shape shape, const NodePositions& X, const Matrix6& D)
 {
   Kinematics result{{}, MatrixXd(0, 3 * X.cols())};
-  std::vector<Strains> mode_strains;
+  std::vector<SolidStrains> mode_strains;
   const Eigen::Matrix3d J0 = shape_functions(shape, centre_of_reference(shape)).dN * X.transpose();
   for (const auto& [xi, weight, at] : stiffness_rule(shape))
   {
@@ -234,7 +234,7 @@ Eigen::MatrixXd stress_stiffness(Shape shape, std::span<const Vec3> x, const Mat
   for (const auto& [xi, weight, at] : stiffness_rule(shape))
   {
     const Eigen::Matrix3d J = at.dN * X.transpose();
-    const Gradients g = J.inverse() * at.dN;
+    const SolidGradients g = J.inverse() * at.dN;
     const auto& [xx, yy, zz, xy, yz, zx] = stress[point];
     Eigen::Matrix3d sigma;
     sigma << xx, xy, zx, xy, yy, yz, zx, yz, zz;
