@@ -173,9 +173,7 @@ std::vector<PathStep> sharing(const std::vector<PathStep>& path)
 /// Structure and contact that share all matrices with these.
 BrakeModel sharing(const Structure& own, const Interface& contact)
 {
-  BrakeModel result{{},
-                    {contact.pairs, contact.directions, shared(contact.B.get()), contact.gap, contact.drive,
-                     contact.geometry, contact.tangents, contact.compliance, contact.friction}};
+  BrakeModel result{{}, sharing(contact)};
   Structure& structure = result.structure;
   for (const auto matrix :
        {&Structure::M, &Structure::C, &Structure::K, &Structure::G, &Structure::H, &Structure::K_loss})

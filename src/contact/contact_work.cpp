@@ -1,6 +1,7 @@
 #include "contact_work.hpp"
 
 #include "squeal/base/broadcast.hpp"
+#include "squeal/base/checkpoint.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,14 +10,17 @@
 namespace squeal
 {
 
-double largest_reaction(const std::vector<double>& r)
+Scales largest_reactions(const ContactWork& work)
 {
-  double largest = 0;
-  for (const double value : r) largest = std::max(largest, std::abs(value));
-  return largest;
+  return largest_of_contacts(work.friction.contact, work.W.pairs(),
+                             [&](std::size_t pair)
+                             {
+                               const PairVector r = work.reaction(pair);
+                               return std::max({std::abs(r[0]), std::abs(r[1]), std::abs(r[2])});
+                             });
 }
 
-double defect_of(const ContactWork& work, std::size_t pair, const PairVector& w, double largest)
+double defect_of(const ContactWork& work, std::size_t pair, const PairVector& w, const Scales& largest)
 {
   const double defect = natural_map(work.reaction(pair), w, work.friction.of(pair), work.W.scale(pair));
   if (!std::isfinite(defect + w[0] + w[1] + w[2])) return std::numeric_limits<double>::infinity();
@@ -25,7 +29,7 @@ double defect_of(const ContactWork& work, std::size_t pair, const PairVector& w,
 
 double residual_of(const ContactWork& work)
 {
-  const double largest = largest_reaction(work.r);
+  const Scales largest = largest_reactions(work);
   double residual = 0;
   for (std::size_t pair = 0; pair < work.W.pairs(); ++pair)
     residual = std::max(residual, defect_of(work, pair, work.velocity(pair), largest));
@@ -47,11 +51,37 @@ void form_products(std::span<ContactWork* const> works)
   works.front()->W.multiply(r, Wr);
 }
 
+namespace
+{
+
+void describe(Checkpoint& checkpoint, FrictionLaw& law)
+{
+  describe_all(checkpoint, law.coefficient, law.static_coefficient, law.decay_speed, law.factor_at_speed.at,
+               law.factor_at_speed.value);
+}
+
+/// The laws as numbers, without those of each pair.
+void describe_laws(Checkpoint& checkpoint, PairFriction& friction)
+{
+  std::size_t own = friction.own.size();
+  checkpoint.pass_size(own);
+  friction.own.resize(own);
+  describe(checkpoint, friction.common);
+  for (FrictionLaw& law : friction.own) describe(checkpoint, law);
+}
+
+} // namespace
+
 PairFriction announced_friction(PairFriction friction, MPI_Comm comm)
 {
-  MPI_Bcast(&friction.common, sizeof friction.common, MPI_BYTE, 0, comm);
-  broadcast(friction.own, comm);
+  Checkpoint written;
+  describe_laws(written, friction);
+  std::vector<double> numbers = written.numbers();
+  broadcast(numbers, comm);
+  Checkpoint read(std::move(numbers));
+  describe_laws(read, friction);
   broadcast(friction.number_of_own, comm);
+  broadcast(friction.contact, comm);
   return friction;
 }
 

@@ -6,6 +6,8 @@
 namespace squeal
 {
 
+using Scales = std::vector<double>; // of forces, one a contact [N]
+
 struct ContactWork
 {
   const ContactOperator& W;
@@ -17,7 +19,11 @@ struct ContactWork
   int reads = 0;          // products with W
   ContactResult result{};
 
-  double scale_of(std::size_t pair, double largest) const { return force_scale(W.scale(pair), speed, largest); }
+  /// `largest`: reaction of each contact.
+  double scale_of(std::size_t pair, const Scales& largest) const
+  {
+    return force_scale(W.scale(pair), speed, largest[friction.contact_of(pair)]);
+  }
 
   PairVector reaction(std::size_t pair) const { return PairView(r, W.directions()).vector(pair); }
 
@@ -30,11 +36,12 @@ struct ContactWork
   }
 };
 
-double largest_reaction(const std::vector<double>& r);
+/// Of each contact.
+Scales largest_reactions(const ContactWork& work);
 
 /// By how much the law of a pair with the velocity w is missed, over the scale of its forces; `largest`: reaction of
-/// all pairs. Infinite where a number is not finite.
-double defect_of(const ContactWork& work, std::size_t pair, const PairVector& w, double largest);
+/// each contact. Infinite where a number is not finite.
+double defect_of(const ContactWork& work, std::size_t pair, const PairVector& w, const Scales& largest);
 
 /// The largest defect of all pairs.
 double residual_of(const ContactWork& work);

@@ -71,7 +71,7 @@ template <class Entry> bool change_reaction(SweptProblem<Entry>& problem, std::s
 }
 
 /// Solves one pair if its law is missed by more than `limit`. The defect before, or 0 if its reaction does not change.
-template <class Entry> double visit(SweptProblem<Entry>& problem, std::size_t pair, double limit, double largest)
+template <class Entry> double visit(SweptProblem<Entry>& problem, std::size_t pair, double limit, const Scales& largest)
 {
   const ContactWork& work = problem.work;
   const ContactOperator& W = work.W;
@@ -137,7 +137,7 @@ void act_on_other_patches(const Problems<double>&, const SweptPairs&, const Turn
 /// The residual by dw, whose rounding it contains, in the pairs of this rank.
 template <class Entry> double estimated_residual(const SweptProblem<Entry>& problem, const SweptPairs& where)
 {
-  const double largest = largest_reaction(problem.work.r);
+  const Scales largest = largest_reactions(problem.work);
   double residual = 0;
   where.for_each_own(
       [&](std::size_t pair)
@@ -188,7 +188,7 @@ struct Swept
 
 /// Sweeps over one patch, at most so often for each problem, until the defects are small beside the first ones.
 template <class Entry> void sweep_patch(const Problems<Entry>& problems, std::span<const std::size_t> patch,
-                                        const std::vector<int>& at_most, const std::vector<double>& largest,
+                                        const std::vector<int>& at_most, const std::vector<Scales>& largest,
                                         std::vector<Swept>& swept)
 {
   std::vector<double> at_first(problems.size(), 0);
@@ -219,11 +219,11 @@ void agree(std::vector<Swept>& swept, const SweptPairs& where)
 template <class Entry>
 void sweep_once(Problems<Entry>& sweeping, const SweptPairs& where, const ContactSettings& settings)
 {
-  std::vector<double> largest;
+  std::vector<Scales> largest;
   std::vector<int> at_most;
   for (const SweptProblem<Entry>* problem : sweeping)
   {
-    largest.push_back(largest_reaction(problem->work.r));
+    largest.push_back(largest_reactions(problem->work));
     const int left = static_cast<int>(settings.max_iterations) - problem->work.result.iterations;
     at_most.push_back(where.several && !where.by_pieces() ? std::min(most_of_a_patch, left) : 1);
   }

@@ -110,17 +110,24 @@ void check_interface(const Interface& interface, const std::string& source, MPI_
   agree(comm, problem);
 }
 
+Interface sharing(const Interface& of)
+{
+  return {of.pairs,    of.directions, shared(of.B.get()), of.gap,     of.drive, of.geometry,
+          of.tangents, of.compliance, of.slip_compliance, of.friction};
+}
+
 Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& scene, const DofMap& dofs, MPI_Comm comm)
 {
   Interface interface;
   interface.pairs = static_cast<int>(pairs.size());
   interface.friction = friction_of_pairs(scene, pairs);
   interface.directions = 1;
-  bool compliant = false;
+  bool compliant = false, elastic = false;
   for (const Contact& contact : scene.contacts)
   {
     if (contact.tangents.size() != 1) interface.directions = 2;
     compliant = compliant || contact.compliance > 0;
+    elastic = elastic || contact.slip_compliance > 0;
   }
   std::vector<SparseRow> rows; // all of them, on rank 0
   for (const ContactPair& pair : pairs)
@@ -134,7 +141,9 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
     interface.geometry.push_back(pair);
     interface.tangents.push_back({axes[0], axes.size() > 1 ? axes[1] : Vec3{}});
     interface.gap.push_back(contact.gap + pair.gap);
-    if (compliant) interface.compliance.push_back(contact.compliance / (pair.area > 0 ? pair.area : 1));
+    const double area = pair.area > 0 ? pair.area : 1;
+    if (compliant) interface.compliance.push_back(contact.compliance / area);
+    if (elastic) interface.slip_compliance.push_back(contact.slip_compliance / area);
     if (rank_of(comm) != 0) continue;
     axes.insert(axes.begin(), pair.normal);
     for (const Vec3& axis : axes)
@@ -247,6 +256,40 @@ void add_reactions(const Interface& interface, const std::vector<double>& r, Vec
   const Owned<Vec> rows = vector_of_rows(interface.B);
   set_all_entries(rows, r);
   check(MatMultTransposeAdd(interface.B, rows, y, y));
+}
+
+double slip_compliance_of(const Interface& interface, std::size_t pair)
+{
+  return interface.slip_compliance.empty() || !is_undriven(interface, pair) ? 0 : interface.slip_compliance[pair];
+}
+
+bool has_elastic_slip(const Interface& interface)
+{
+  for (std::size_t pair = 0; pair < interface.slip_compliance.size(); ++pair)
+    if (slip_compliance_of(interface, pair) > 0) return true;
+  return false;
+}
+
+std::vector<double> compliance_of_rows(const Interface& interface)
+{
+  std::vector<double> result;
+  if (interface.compliance.empty() && interface.slip_compliance.empty()) return result;
+  result.resize(interface.size());
+  const PairView<double> rows(result, interface.directions);
+  for (std::size_t pair = 0; pair < rows.pairs(); ++pair)
+  {
+    std::ranges::fill(rows.tangential(pair), slip_compliance_of(interface, pair));
+    rows.normal(pair) = compliance_of(interface, pair);
+  }
+  return result;
+}
+
+std::vector<double> slip_positions(const Interface& interface, Vec u, const std::vector<double>& reactions)
+{
+  std::vector<double> position = relative(interface, u);
+  const std::vector<double> compliance = compliance_of_rows(interface);
+  for (std::size_t row = 0; row < compliance.size(); ++row) position[row] += compliance[row] * reactions[row];
+  return position;
 }
 
 double drive_speed(const Interface& interface, std::size_t pair)

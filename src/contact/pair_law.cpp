@@ -197,7 +197,7 @@ PairVector slip_at_own_speed(const PairBlock& A, const PairVector& q, int direct
   const auto excess = [&](double v) { return speed_of(friction_coefficient(law, v).value) - v; };
   const double at_low = excess(0);
   if (at_low <= 0) return r;
-  double high = std::max(at_low, speed_of(law.coefficient)), at_high = excess(high);
+  double high = std::max(at_low, speed_of(friction_coefficient(law, HUGE_VAL).value)), at_high = excess(high);
   for (int doubling = 0; at_high > 0 && doubling < 60; ++doubling) high *= 2, at_high = excess(high);
   if (!(at_high < 0)) return r;
   const auto rounded = [&](double v) // zero where the excess is at the rounding of v
@@ -257,7 +257,7 @@ PairVector solve_pair(const PairBlock& A, const PairVector& q, int directions, c
   const double mu = friction_coefficient(law, 0).value; // of stick
   if (mu == 0 && law.coefficient == 0) return {-q[0] / A[0][0], 0, 0};
   if (const auto r = stick(A, q); r && holds(*r, mu)) return *r;
-  return law.decay_speed == 0 ? slip_at(A, q, directions, mu, last) : slip_at_own_speed(A, q, directions, law, last);
+  return depends_on_speed(law) ? slip_at_own_speed(A, q, directions, law, last) : slip_at(A, q, directions, mu, last);
 }
 
 ContactStatus contact_status(const PairVector& r, const PairVector& w, const FrictionLaw& law, double largest)
@@ -265,21 +265,21 @@ ContactStatus contact_status(const PairVector& r, const PairVector& w, const Fri
   if (r[0] <= 0) return ContactStatus::open;
   const double limit = friction_coefficient(law, 0).value * r[0];
   if (limit - length(r[1], r[2]) <= 1e-8 * largest) return ContactStatus::slip;
-  if (law.decay_speed == 0) return ContactStatus::stick;
-  return length(w[1], w[2]) < 1e-5 * law.decay_speed ? ContactStatus::stick : ContactStatus::slip;
+  if (!depends_on_speed(law)) return ContactStatus::stick;
+  return length(w[1], w[2]) < 1e-5 * speed_scale(law) ? ContactStatus::stick : ContactStatus::slip;
 }
 
 std::vector<ContactStatus> contact_status(PairView<const double> reactions, PairView<const double> w,
                                           const PairFriction& friction)
 {
-  double largest = 0;
-  for (std::size_t pair = 0; pair < reactions.pairs(); ++pair) largest = std::max(largest, reactions.normal(pair));
+  const std::vector<double> largest = largest_of_contacts(friction.contact, reactions.pairs(),
+                                                          [&](std::size_t pair) { return reactions.normal(pair); });
   std::vector<ContactStatus> status;
   for (std::size_t pair = 0; pair < reactions.pairs(); ++pair)
   {
     const FrictionLaw& law = friction.of(pair);
-    status.push_back(
-        contact_status(reactions.vector(pair), law.decay_speed == 0 ? PairVector{} : w.vector(pair), law, largest));
+    status.push_back(contact_status(reactions.vector(pair), depends_on_speed(law) ? w.vector(pair) : PairVector{}, law,
+                                    largest[friction.contact_of(pair)]));
   }
   return status;
 }

@@ -77,27 +77,27 @@ PairState pair_state(const StickSlipOperator& of, const StickSlipFriction& frict
 /// contacts' and of what slips would take, where a contact is about to open.
 std::vector<double> scales_of(const StickSlipOperator& of, const StickSlipState& at)
 {
-  constexpr double small = 1e-4; // beside it rounding of the others stays below the tolerance
-  double all = 0;
+  constexpr double small = 1e-4;
+  double slip = 0;
   for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
-    all = std::max({all, entries(at.r, pair, of.directions).norm(),
-                    entries(at.w, pair, of.directions).tail<2>().norm() / of.compliance});
-  std::vector<double> scale;
-  for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
-  {
-    const auto contact = static_cast<std::size_t>(of.contact[pair]);
-    scale.resize(std::max(scale.size(), contact + 1), small * all);
-    scale[contact] = std::max(scale[contact], entries(at.r, pair, of.directions).norm());
-  }
-  return scale;
+    slip = std::max(slip, entries(at.w, pair, of.directions).tail<2>().norm() / of.compliance);
+  return largest_of_contacts(of.contact, of.rho.size(),
+                             [&](std::size_t pair)
+                             { return std::max(entries(at.r, pair, of.directions).norm(), small * slip); });
+}
+
+VectorXd times_M(const StickSlipOperator& of, const VectorXd& r)
+{
+  return of.M.size() > 0 ? VectorXd(of.M * r) : r;
 }
 
 /// |N w - q - M r| over the part of reactions and motions in it.
 double imbalance(const StickSlipOperator& of, const VectorXd& q, const StickSlipState& at)
 {
-  const double scale = std::max(
-      {q.lpNorm<Eigen::Infinity>(), at.w.lpNorm<Eigen::Infinity>(), of.compliance * at.r.lpNorm<Eigen::Infinity>()});
-  return scale > 0 ? (of.N * at.w - q - of.M * at.r).lpNorm<Eigen::Infinity>() / scale : 0;
+  const double per_force = of.M.size() > 0 ? of.compliance : 1,
+               of_motion = of.N.cwiseAbs().lazyProduct(at.w.cwiseAbs()).maxCoeff(),
+               scale = std::max({q.lpNorm<Eigen::Infinity>(), of_motion, per_force * at.r.lpNorm<Eigen::Infinity>()});
+  return scale > 0 ? (of.N * at.w - q - times_M(of, at.r)).lpNorm<Eigen::Infinity>() / scale : 0;
 }
 
 double sum_of_squares(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
@@ -114,6 +114,8 @@ StickSlipOperator make_stick_slip_operator(MatrixXd N, MatrixXd M, int direction
 {
   StickSlipOperator result{std::move(N), std::move(M), directions, {}, 0, std::move(contact)};
   result.compliance = result.M.diagonal().maxCoeff();
+  for (Index row = 0; row < result.M.rows(); ++row) // neither side moves along it: a spring there carries nothing
+    if (result.M.row(row).isZero(0)) result.M(row, row) = result.compliance;
   const PairRows<Index> rows(directions);
   for (Index pair = 0; pair < static_cast<Index>(result.contact.size()); ++pair)
   {
@@ -124,6 +126,16 @@ StickSlipOperator make_stick_slip_operator(MatrixXd N, MatrixXd M, int direction
     result.rho.push_back(natural_scale(own, result.compliance));
   }
   return result;
+}
+
+std::optional<DividedOperator> divided(StickSlipOperator& of)
+{
+  constexpr double dependent = 1e-8; // forces would lose as many digits
+  Eigen::PartialPivLU<MatrixXd> by(of.M);
+  if (!(by.rcond() > dependent)) return std::nullopt;
+  of.N = by.solve(of.N).eval();
+  of.M.resize(0, 0);
+  return DividedOperator{std::move(of), std::move(by)};
 }
 
 double stick_slip_residual(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
@@ -191,52 +203,84 @@ StatusSystem::PairSystem StatusSystem::system_of(std::size_t pair, const StickSl
 }
 
 StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
-    : of_(of), matrix_(of.M.rows(), of.M.cols())
+    : of_(of)
 {
   const PairRows<Index> rows(of.directions);
   const Index own = rows.per_pair();
-  particular_ = {VectorXd::Zero(of.M.rows()), VectorXd::Zero(of.M.rows())};
+  const bool whole = of.M.size() > 0;
+  particular_ = {VectorXd::Zero(of.N.rows()), VectorXd::Zero(of.N.rows())};
   for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
   {
     const PairSystem& system = pairs_.emplace_back(system_of(pair, friction, at));
     const Index first = rows.normal(static_cast<Index>(pair));
-    matrix_.middleCols(first, own).noalias() = of.N.middleCols(first, own) * system.W.topLeftCorner(own, own);
-    matrix_.middleCols(first, own).noalias() -= of.M.middleCols(first, own) * system.R.topLeftCorner(own, own);
     particular_.r.segment(first, own) = system.r.head(own);
     particular_.w.segment(first, own) = system.w.head(own);
-    for (Index k = 0; k < own; ++k) // a row in which neither side moves leaves its friction open: it stays
-      if (matrix_.col(first + k).isZero(0)) matrix_(first + k, first + k) = -1;
+    if (!whole && statuses_.back() == ContactStatus::stick) continue;
+    unknown_.push_back(pair);
+    for (Index k = 0; k < own; ++k) rows_.push_back(first + k);
   }
-  factors_.compute(matrix_);
+  const auto size = static_cast<Index>(rows_.size());
+  matrix_.resize(size, size);
+  for (std::size_t i = 0; i < unknown_.size(); ++i)
+  {
+    const PairSystem& system = pairs_[unknown_[i]];
+    const Index first = rows.normal(static_cast<Index>(unknown_[i])), to = rows.normal(static_cast<Index>(i));
+    const auto of_pair = Eigen::seqN(first, own);
+    auto columns = matrix_.middleCols(to, own);
+    columns.noalias() = of.N(rows_, of_pair) * system.W.topLeftCorner(own, own);
+    if (whole)
+      columns.noalias() -= of.M(rows_, of_pair) * system.R.topLeftCorner(own, own);
+    else
+      columns.middleRows(to, own) -= system.R.topLeftCorner(own, own);
+    for (Index k = 0; k < own; ++k) // a row in which neither side moves leaves its friction open: it stays
+      if (columns.col(k).isZero(0)) columns(to + k, k) = -1;
+  }
+  if (size > 0) factors_.compute(matrix_);
 }
 
 StickSlipState StatusSystem::spread(const VectorXd& y) const
 {
-  StickSlipState result{VectorXd(y.size()), VectorXd(y.size())};
+  StickSlipState result{VectorXd::Zero(of_.N.rows()), VectorXd::Zero(of_.N.rows())};
   const PairRows<Index> rows(of_.directions);
   const Index own = rows.per_pair();
-  for (std::size_t pair = 0; pair < pairs_.size(); ++pair)
+  for (std::size_t i = 0; i < unknown_.size(); ++i)
   {
-    const Index first = rows.normal(static_cast<Index>(pair));
-    result.r.segment(first, own) = pairs_[pair].R.topLeftCorner(own, own) * y.segment(first, own);
-    result.w.segment(first, own) = pairs_[pair].W.topLeftCorner(own, own) * y.segment(first, own);
+    const PairSystem& system = pairs_[unknown_[i]];
+    const Index first = rows.normal(static_cast<Index>(unknown_[i]));
+    const auto of_pair = y.segment(rows.normal(static_cast<Index>(i)), own);
+    result.r.segment(first, own) = system.R.topLeftCorner(own, own) * of_pair;
+    result.w.segment(first, own) = system.W.topLeftCorner(own, own) * of_pair;
   }
   return result;
 }
 
-StickSlipState StatusSystem::response(const VectorXd& rhs) const
+VectorXd StatusSystem::solution(const VectorXd& rhs) const
 {
-  if (reciprocal_condition() > 1e-13) return spread(factors_.solve(rhs));
+  if (rhs.size() == 0) return rhs;
+  if (reciprocal_condition() > 1e-13) return factors_.solve(rhs);
   // rows of pairs that depend on each other: the shortest solution shares what they carry evenly
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal;
   orthogonal.setThreshold(1e-12);
   orthogonal.compute(matrix_);
-  return spread(orthogonal.solve(rhs));
+  return orthogonal.solve(rhs);
+}
+
+StickSlipState StatusSystem::response(const VectorXd& rhs) const
+{
+  StickSlipState result = spread(solution(rhs(rows_)));
+  if (of_.M.size() > 0) return result;
+  const VectorXd forces = of_.N * result.w - rhs;
+  const PairRows<Index> rows(of_.directions);
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair)
+    if (statuses_[pair] == ContactStatus::stick)
+      result.r.segment(rows.normal(static_cast<Index>(pair)), rows.per_pair()) =
+          forces.segment(rows.normal(static_cast<Index>(pair)), rows.per_pair());
+  return result;
 }
 
 StickSlipState StatusSystem::change(const VectorXd& rhs) const
 {
-  StickSlipState result = response(rhs - of_.N * particular_.w + of_.M * particular_.r);
+  StickSlipState result = response(rhs - of_.N * particular_.w + times_M(of_, particular_.r));
   result.r += particular_.r;
   result.w += particular_.w;
   return result;
@@ -245,7 +289,8 @@ StickSlipState StatusSystem::change(const VectorXd& rhs) const
 int StatusSystem::index() const
 {
   int forces = 0;
-  for (const PairSystem& pair : pairs_) forces += pair.forces;
+  if (unknown_.empty()) return 1;
+  for (const std::size_t pair : unknown_) forces += pairs_[pair].forces;
   const auto negative = (factors_.matrixLU().diagonal().array() < 0).count();
   const double sign = factors_.permutationP().determinant() * ((forces + negative) % 2 == 0 ? 1 : -1);
   return sign > 0 ? 1 : -1;
@@ -253,8 +298,9 @@ int StatusSystem::index() const
 
 double StatusSystem::reciprocal_condition() const
 {
+  if (unknown_.empty()) return 1;
   const VectorXd pivots = factors_.matrixLU().diagonal().cwiseAbs();
-  return pivots.size() == 0 ? 1 : pivots.minCoeff() / pivots.maxCoeff();
+  return pivots.minCoeff() / pivots.maxCoeff();
 }
 
 StickSlipSolution solve_stick_slip(const StickSlipOperator& of, const StickSlipFriction& friction, const VectorXd& q,
@@ -270,7 +316,7 @@ StickSlipSolution solve_stick_slip(const StickSlipOperator& of, const StickSlipF
     if (residual < best.residual) best = {at, iteration, residual}, last_gain = iteration;
     if (!std::isfinite(at.r.sum() + at.w.sum()) || residual <= tight) break;
     const StatusSystem system(of, friction, at);
-    const StickSlipState change = system.change(q + of.M * at.r - of.N * at.w);
+    const StickSlipState change = system.change(q + times_M(of, at.r) - of.N * at.w);
     const double merit = sum_of_squares(of, friction, at);
     double part = 1;
     StickSlipState next{at.r + change.r, at.w + change.w};

@@ -25,7 +25,7 @@ MatrixXd generators(const PathProblem& problem, const StickSlipFriction& frictio
   std::vector<VectorXd> columns;
   const auto add = [&](std::size_t pair, double first, double second)
   {
-    VectorXd& column = columns.emplace_back(VectorXd::Zero(problem.of.M.rows()));
+    VectorXd& column = columns.emplace_back(VectorXd::Zero(problem.of.N.rows()));
     const Index normal = rows.normal(static_cast<Index>(pair));
     column[normal] = 1;
     column[normal + 1] = friction.mu[pair] * first;
@@ -43,7 +43,7 @@ MatrixXd generators(const PathProblem& problem, const StickSlipFriction& frictio
         const double angle = two_pi * side / sides, corner = 1 / std::cos(two_pi / 2 / sides); // over the radius
         add(pair, corner * std::cos(angle), corner * std::sin(angle));
       }
-  MatrixXd result(problem.of.M.rows(), static_cast<Index>(columns.size()));
+  MatrixXd result(problem.of.N.rows(), static_cast<Index>(columns.size()));
   for (Index i = 0; i < result.cols(); ++i) result.col(i) = columns[static_cast<std::size_t>(i)];
   return result;
 }
@@ -85,7 +85,8 @@ std::optional<VectorXd> unresisted_motion(const PathProblem& problem, const Stic
 {
   // rows that move without strain, N b = 0: what drives them by the load, kappa b'q, has to be balanced by b'r
   const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum(problem.of.N);
-  const Index free = (spectrum.eigenvalues().array().abs() < 1e-9).count();
+  const VectorXd stiffness = spectrum.eigenvalues().cwiseAbs();
+  const Index free = (stiffness.array() <= 1e-9 * stiffness.maxCoeff()).count();
   if (free == 0) return std::nullopt;
   const MatrixXd rigid = spectrum.eigenvectors().leftCols(free);
   const VectorXd drive = -problem.kappa * (rigid.transpose() * q);

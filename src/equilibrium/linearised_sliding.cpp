@@ -44,7 +44,8 @@ std::vector<HeldRow> held_rows(const Interface& interface, const std::vector<cha
     if (!closed[i]) continue;
     const bool rigid = compliance_of(interface, i) == 0, sticks = is_undriven(interface, i);
     if (rigid) (sticks ? sticking : sliding).push_back({pair, 0});
-    for (int k = 1; sticks && k <= interface.directions; ++k) sticking.push_back({pair, k});
+    for (int k = 1; sticks && slip_compliance_of(interface, i) == 0 && k <= interface.directions; ++k)
+      sticking.push_back({pair, k});
   }
   sliding.insert(sliding.end(), sticking.begin(), sticking.end());
   return sliding;
@@ -340,48 +341,6 @@ Owned<Mat> project(Mat A, Mat Y, Mat Z)
   return result;
 }
 
-Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>& closed,
-                            const std::vector<double>& reactions, FrictionDamping part)
-{
-  const PairRows<PetscInt> rows(interface.directions);
-  const TangentView drive(interface.drive, interface.directions);
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(interface.B, &first, &last));
-  Owned<Mat> result;
-  check(MatCreateAIJ(comm_of(interface.B), last - first, last - first, PETSC_DETERMINE, PETSC_DETERMINE,
-                     interface.directions, nullptr, interface.directions, nullptr,
-                     result.put())); // a pair may straddle ranks
-  bool any = false;                  // alike on every rank
-  for (std::size_t i = 0; i < closed.size(); ++i)
-  {
-    const double reaction = PairView(reactions, interface.directions).normal(i);
-    if (!closed[i] || reaction <= 0) continue;
-    const SlidingFriction friction = sliding_friction(interface.friction.of(i), reaction, drive.of(i)); // even in s
-    const auto& damping = part == FrictionDamping::whole ? friction.damping : friction.damping_of_speed;
-    const PetscInt tangential = rows.tangential(static_cast<PetscInt>(i));
-    for (PetscInt k = 0; k < rows.directions; ++k)
-      for (PetscInt l = 0; l < rows.directions; ++l)
-      {
-        const double value = damping[static_cast<std::size_t>(k)][static_cast<std::size_t>(l)];
-        any = any || value != 0;
-        if (tangential + k >= first && tangential + k < last)
-          check(MatSetValue(result, tangential + k, tangential + l, value, INSERT_VALUES));
-      }
-  }
-  if (!any) return {};
-  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
-  return result;
-}
-
-Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>& closed,
-                            const std::vector<double>& reactions, FrictionDamping part)
-{
-  const Owned<Mat> damping = damping_of_pairs(interface, closed, reactions, part);
-  if (!damping.get()) return {};
-  return project(damping, interface.B, interface.B);
-}
-
 std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
                                                    Vec imaginary)
 {
@@ -413,12 +372,34 @@ Owned<Mat> sliding_damping(const SlidingEquilibrium& sliding)
   return result;
 }
 
+namespace
+{
+
+/// The contact with pairs that slipped on the load path sliding along their last friction, where that is asked for.
+Interface with_slipped_pairs(const Interface& of, const Equilibrium& equilibrium)
+{
+  Interface result = sharing(of);
+  if (!equilibrium.history || of.friction.common.slipped_pairs_stick) return result;
+  constexpr double at_rest = 1e-300; // [m/s] the friction that they slipped with
+  for (std::size_t i = 0; i < of.gap.size(); ++i)
+  {
+    if (!is_undriven(of, i) || equilibrium.history->statuses[i] != ContactStatus::slip) continue;
+    const std::span<const double> friction = PairView(equilibrium.reactions, of.directions).tangential(i);
+    const std::span<double> drive = TangentView<double>(result.drive, of.directions).of(i);
+    for (std::size_t k = 0; k < drive.size(); ++k) drive[k] = at_rest / length(friction) * friction[k];
+  }
+  return result;
+}
+
+} // namespace
+
 LinearisedSliding linearise(const SlidingEquilibrium& sliding)
 {
-  const auto& [structure, interface, equilibrium] = sliding;
+  const auto& [structure, driven, equilibrium] = sliding;
+  const Interface interface = with_slipped_pairs(driven, equilibrium);
   LinearisedSliding result;
   result.contact = eliminate_closed_pairs(structure, interface, equilibrium.closed);
-  result.C = sliding_damping(sliding);
+  result.C = sliding_damping(sliding); // by the drive
   if (structure.H.get()) result.K = sum_of(structure.K, structure.H);
   if (const auto stiffness = contact_stiffness(interface, equilibrium.closed, PairForces::with_friction);
       stiffness.get())

@@ -64,15 +64,13 @@ StickSlipFriction friction_of(const Interface& interface)
   return friction;
 }
 
-/// N = 1 - kappa D and M = D, to which compliances of pairs add: the unknown gap is then g + c r_n.
+/// N = 1 - kappa D and M = D, to which compliances c in series with the rows add: the unknown motions are w + c r.
 StickSlipOperator operator_of(const PathOperators& operators, const Interface& interface)
 {
   MatrixXd N = -operators.held.kappa * operators.D, M = operators.D;
   N.diagonal().array() += 1;
   N = (N.array().abs() < 1e-13).select(0, N); // rounding of 1 - 1: the pair alone holds its body
-  const PairRows<Index> rows(interface.directions);
-  for (std::size_t i = 0; i < interface.compliance.size(); ++i)
-    M.col(rows.normal(static_cast<Index>(i))) += interface.compliance[i] * N.col(rows.normal(static_cast<Index>(i)));
+  if (const std::vector<double> c = compliance_of_rows(interface); !c.empty()) M += N * as_vector(c).asDiagonal();
   return make_stick_slip_operator(std::move(N), std::move(M), interface.directions, contacts_of(interface));
 }
 
@@ -140,18 +138,26 @@ std::string mechanism(const PathProblem& problem, const PathWalk& walk, const In
 /// The end of the walk. All but `found` is rank 0's.
 struct EndOfPath
 {
-  StickSlipOperator of;
-  StickSlipFriction friction;
-  std::optional<StatusSystem> system;
-  Found found;
+  StickSlipOperator of{};
+  std::optional<Eigen::PartialPivLU<MatrixXd>> by{}; // M of the operator, where it is divided
+  StickSlipFriction friction{};
+  std::optional<StatusSystem> system{};
+  Found found{};
+
+  VectorXd divided(const VectorXd& q) const { return by ? VectorXd(by->solve(q)) : q; }
 };
 
 /// On rank 0.
-void walk_to_end(const PathOperators& operators, const Interface& interface, const std::vector<PathEnd>& ends,
-                 EndOfPath& end)
+void walk_to_end(const PathOperators& operators, const Interface& interface, std::vector<PathEnd> ends, EndOfPath& end)
 {
   end.of = operator_of(operators, interface);
-  const PathProblem problem{end.of, operators.held.kappa, interface.gap, friction_of(interface), ends};
+  if (std::optional<DividedOperator> stiff = divided(end.of))
+  {
+    end.of = std::move(stiff->of);
+    end.by = std::move(stiff->by);
+  }
+  for (PathEnd& step : ends) step.q = end.divided(step.q);
+  const PathProblem problem{end.of, end.by ? 1 : operators.held.kappa, interface.gap, friction_of(interface), ends};
   const PathWalk walk = walk_path(problem);
   end.friction = walk.friction;
   Found& found = end.found;
@@ -180,14 +186,13 @@ void settle(const PathOperators& operators, const Structure& structure, const In
 {
   Found& found = end.found;
   const MPI_Comm comm = comm_of(structure.load);
-  const PairRows<std::size_t> rows(interface.directions);
+  const std::vector<double> compliance = compliance_of_rows(interface);
   for (int pass = 0;; ++pass)
   {
-    // motion of the rows: w - offset, less the approach of the pairs
+    // motion of the rows: w - offset, less what gives in series with them
     std::vector<double> moved = found.w, forces = found.r;
     for (std::size_t k = 0; k < moved.size(); ++k) moved[k] -= found.offset[k];
-    for (std::size_t i = 0; i < interface.gap.size(); ++i)
-      moved[rows.normal(i)] -= compliance_of(interface, i) * found.r[rows.normal(i)];
+    for (std::size_t k = 0; k < compliance.size(); ++k) moved[k] -= compliance[k] * found.r[k];
     for (std::size_t k = 0; k < moved.size(); ++k) forces[k] += operators.held.kappa * moved[k];
     displace(operators.held, interface, structure.load, forces, u);
     if (pass == 2) return;
@@ -195,7 +200,7 @@ void settle(const PathOperators& operators, const Structure& structure, const In
     on_rank_zero_with_lent_cores(comm, interface.size(),
                                  [&]
                                  {
-                                   const StickSlipState change = end.system->response(error);
+                                   const StickSlipState change = end.system->response(end.divided(error));
                                    found.r = as_list(as_vector(found.r) + change.r);
                                    found.w = as_list(as_vector(found.w) + change.w);
                                  });
@@ -239,10 +244,8 @@ void set_pairs(const Interface& interface, const Found& found, Equilibrium& equi
 double residual_of(const Interface& interface, const EndOfPath& end, const Equilibrium& equilibrium)
 {
   StickSlipState at{as_vector(equilibrium.reactions),
-                    as_vector(relative(interface, equilibrium.u)) + as_vector(end.found.offset)};
-  for (std::size_t i = 0; i < interface.gap.size(); ++i)
-    PairView<double>(at.w, interface.directions).normal(i) +=
-        compliance_of(interface, i) * PairView(equilibrium.reactions, interface.directions).normal(i);
+                    as_vector(slip_positions(interface, equilibrium.u, equilibrium.reactions)) +
+                        as_vector(end.found.offset)};
   double residual = 0;
   on_rank_zero(comm_of(interface.B), [&] { residual = stick_slip_residual(end.of, end.friction, at); });
   MPI_Bcast(&residual, 1, MPI_DOUBLE, 0, comm_of(interface.B));

@@ -47,7 +47,7 @@ StickSlipFriction friction_at(const PathProblem& problem, const Place& place)
 PathWalk unloaded(const PathProblem& problem)
 {
   PathWalk walk;
-  const Index rows = problem.of.M.rows();
+  const Index rows = problem.of.N.rows();
   walk.state = {VectorXd::Zero(rows), VectorXd::Zero(rows)};
   walk.offset = VectorXd::Zero(rows);
   const PairView<double> offset(walk.offset, problem.of.directions);
@@ -80,7 +80,7 @@ StickSlipState guess_from(const PathWalk& walk, const StickSlipOperator& of, con
 {
   StickSlipState guess = walk.state;
   const PairView<double> r(guess.r, of.directions), w(guess.w, of.directions);
-  const double size = q.lpNorm<Eigen::Infinity>();
+  const double size = of.motion(q);
   for (std::size_t pair = 0; pair < w.pairs(); ++pair)
   {
     std::ranges::fill(w.tangential(pair), 0.);
@@ -190,7 +190,7 @@ PathWalk walk_path(const PathProblem& problem)
   {
     PathWalk finer = walk_in_parts(problem, parts);
     constexpr double rounding = 1e-9;
-    const double least = rounding * finer.q.lpNorm<Eigen::Infinity>();
+    const double least = rounding * problem.of.motion(finer.q);
     finer.change = change_between(problem.of, walk.state.r, finer.state.r, least / problem.of.compliance);
     const bool shrinks = finer.largest_move <= std::max(0.75 * walk.largest_move, least),
                jumps = finer.largest_move > std::max(0.9 * walk.largest_move, least);

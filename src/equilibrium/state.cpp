@@ -1,10 +1,12 @@
 /// States: energies, copies, and files. A file is two PETSc binary vectors (solid/binary.hpp).
 #include "squeal/equilibrium/state.hpp"
 
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/whole_file.hpp"
 #include "squeal/equilibrium/file_order.hpp"
 #include "squeal/solid/binary.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
@@ -49,6 +51,11 @@ void check_state_file(const std::filesystem::path& file, PetscInt size)
       throw Error(name + " is cut short: " + std::to_string(bytes) + " bytes, the " + part + " ends at byte " +
                   std::to_string(at));
   }
+  if (bytes == at) return;
+  stream.seekg(at);
+  const std::optional<PetscInt> length = read_vector_header(stream);
+  if (!length || bytes != at + header + static_cast<std::streamoff>(sizeof(double)) * *length)
+    throw Error(name + ": what follows the velocity is no whole vector of slip positions; write the state anew");
 }
 
 /// The entries of the next vector of a file that was checked.
@@ -69,7 +76,7 @@ void require_finite(Vec x, const std::string& what)
 
 State copy_of(const State& state)
 {
-  return {copy_of(state.u.get()), copy_of(state.v.get()), state.time, state.reactions};
+  return {copy_of(state.u.get()), copy_of(state.v.get()), state.time, state.reactions, state.slip};
 }
 
 double kinetic_energy(const Structure& structure, Vec v)
@@ -92,6 +99,7 @@ void write_state(const State& state, const Structure& structure, const std::file
                  std::string bytes;
                  append_vector(u, bytes);
                  append_vector(v, bytes);
+                 if (!state.slip.empty()) append_vector(state.slip, bytes);
                  write_whole_file(file, bytes);
                });
 }
@@ -101,7 +109,7 @@ State read_state(const std::filesystem::path& file, const Structure& structure)
   const MPI_Comm comm = comm_of(structure.load);
   PetscInt size = 0;
   check(VecGetSize(structure.load, &size));
-  std::vector<double> u, v; // on rank 0
+  std::vector<double> u, v, slip; // on rank 0
   on_rank_zero(comm,
                [&]
                {
@@ -109,13 +117,17 @@ State read_state(const std::filesystem::path& file, const Structure& structure)
                  std::ifstream stream(file, std::ios::binary);
                  u = next_vector(stream);
                  v = next_vector(stream);
+                 if (stream.peek() != std::ifstream::traits_type::eof()) slip = next_vector(stream);
                });
+  broadcast(slip, comm);
   const FileOrder order(structure);
-  State state{zeros_like(structure.load), zeros_like(structure.load), 0, {}};
+  State state{zeros_like(structure.load), zeros_like(structure.load), 0, {}, std::move(slip)};
   order.scatter(u, state.u);
   order.scatter(v, state.v);
   require_finite(state.u, "state file " + file.string() + ": the displacement");
   require_finite(state.v, "state file " + file.string() + ": the velocity");
+  if (!std::ranges::all_of(state.slip, [](double position) { return std::isfinite(position); }))
+    throw Error("state file " + file.string() + ": the slip positions hold entries that are not finite");
   return state;
 }
 

@@ -147,6 +147,10 @@ void add_modes(Entry out, const Report& report)
   out.add("count_found", "-", "number of pairs found below it", count.found);
   out.add("count_frequency_hz", "Hz", "where pairs were counted: the band, or just above it", count.frequency);
   out.add("beyond_band_hz", "Hz", "pairs between the band and `count_frequency_hz`", modes.beyond_band);
+  const auto& linearised = report.point.linearised;
+  const int dependent = linearised ? linearised->contact.dependent_rows : 0;
+  if (out.has(dependent > 0))
+    out.show("dependent_rows", "-", "rows of pairs that stick which the other rows imply", dependent);
   out.list("modes", add_mode, modes.modes);
   if (out.has(!modes.projected.empty())) out.list("projected", add_mode, modes.projected); // of the other route
   warn_of_modes(out, modes, report.model);

@@ -224,7 +224,19 @@ private:
     if (contact.rotation && contact.velocity != Vec3{})
       fail(&contact.velocity, "[[contact]] rotation and velocity exclude each other: keep one");
     if (contact.friction) check_law(*contact.friction, &contact.friction, "[[contact]]");
+    if (contact.slip_compliance > 0) check_elastic_slip(contact);
     check_frame(contact);
+  }
+
+  void check_elastic_slip(const Contact& contact) const
+  {
+    const auto refuse = [&](const char* why)
+    { fail(&contact.slip_compliance, "[[contact]] slip_compliance " + std::string(why)); };
+    if (!is_undriven(contact)) refuse("is of contacts that stick: one with a rotation or velocity slides");
+    if (depends_on_speed(contact.friction ? *contact.friction : scene_.friction))
+      refuse("goes with a friction that does not change with the speed: give the contact its own, without decay_speed "
+             "and factor_at_speed");
+    if (scene_.cycle.enabled) refuse("is not known to cycles: take it out, or [cycle]");
   }
 
   /// Two contacts of the same surfaces would share their pressure in no particular way.
@@ -275,6 +287,10 @@ private:
 
   void check_law(const FrictionLaw& f, const void* member, const char* table) const
   {
+    const auto& at = f.factor_at_speed.at;
+    if (!at.empty() && (f.static_coefficient > 0 || f.coefficient == 0 || at.front() < 0))
+      fail(member, std::string(table) + " factor_at_speed is on a coefficient above 0, of speeds from 0 on, and takes "
+                                        "the place of static_coefficient and decay_speed");
     if ((f.static_coefficient > 0) != (f.decay_speed > 0))
       fail(member, std::string(table) + " static_coefficient and decay_speed go together: give both, or " +
                        (table == std::string("[friction]") ? "coefficient" : "friction") + " alone");
@@ -355,7 +371,7 @@ private:
     if (t.enabled && t.steps == 0 && t.periods * t.steps_per_period < 0.5)
       fail(&t.periods, "[transient] periods x steps_per_period is less than one time step");
     if (t.enabled && t.start.kind == StartKind::rest && factor_at(t.ramps.load, 0) != 0)
-      fail(t.ramps.load.time.empty() ? static_cast<const void*>(&t.start) : &t.ramps.load,
+      fail(t.ramps.load.at.empty() ? static_cast<const void*>(&t.start) : &t.ramps.load,
            "[transient] start = \"rest\" is a structure without displacements, which a load would move at once: let "
            "load_factor rise from 0, such as load_factor = [[0, 0], [0.01, 1]]");
   }

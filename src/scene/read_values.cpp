@@ -127,14 +127,15 @@ public:
     if (target.empty()) fail(node, "at least one value");
   }
 
-  /// Rows of a time and a factor, the times rising.
-  void read(const toml::node& node, TimeFactor& target) const
+  /// Rows of a time, or a speed, and a factor.
+  void read(const toml::node& node, FactorTable& target) const
   {
     target = {};
-    for (const auto& [time, factor] : rows_of_two(node, "rows [time in s, factor] such as [[0, 0], [0.1, 1]]"))
+    for (const auto& [at, factor] :
+         rows_of_two(node, "rows [time in s or speed in m/s, factor] such as [[0, 0], [0.1, 1]]"))
     {
       if (value_.key.rule == Rule::not_negative && factor < 0) fail(node, "factors of zero or above");
-      target.time.push_back(time);
+      target.at.push_back(at);
       target.value.push_back(factor);
     }
   }
@@ -188,10 +189,10 @@ public:
     }
   }
 
-  template <class Part> void read(const toml::node& node, const MemberTarget<Part>& target) const
+  template <class Part, class Member> void read(const toml::node& node, const MemberTarget<Part, Member>& target) const
   {
     if (!*target.part) target.part->emplace();
-    (**target.part).*target.member = number(node);
+    read(node, (**target.part).*target.member);
   }
 
 private:

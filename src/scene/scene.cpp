@@ -123,21 +123,38 @@ std::vector<double> frequencies_of(const ResponseSettings& response)
   return frequencies;
 }
 
-double factor_at(const TimeFactor& factor, double time)
+namespace
 {
-  const auto& [times, values] = factor;
-  if (times.empty()) return 1;
-  const auto next = std::upper_bound(times.begin(), times.end(), time);
-  if (next == times.begin()) return values.front();
-  if (next == times.end()) return values.back();
-  const auto i = static_cast<std::size_t>(next - times.begin());
-  const double part = (time - times[i - 1]) / (times[i] - times[i - 1]);
-  return (1 - part) * values[i - 1] + part * values[i];
+
+/// The place's number among those given, as of the first one above it.
+std::size_t next_of(const FactorTable& factor, double place)
+{
+  return static_cast<std::size_t>(std::ranges::upper_bound(factor.at, place) - factor.at.begin());
+}
+
+} // namespace
+
+double slope_at(const FactorTable& factor, double place)
+{
+  const auto& [at, value] = factor;
+  const std::size_t next = next_of(factor, place);
+  return next == 0 || next == at.size() ? 0 : (value[next] - value[next - 1]) / (at[next] - at[next - 1]);
+}
+
+double factor_at(const FactorTable& factor, double place)
+{
+  const auto& [at, value] = factor;
+  if (at.empty()) return 1;
+  const std::size_t next = next_of(factor, place);
+  if (next == 0) return value.front();
+  if (next == at.size()) return value.back();
+  const double part = (place - at[next - 1]) / (at[next] - at[next - 1]);
+  return (1 - part) * value[next - 1] + part * value[next];
 }
 
 bool are_given(const Ramps& ramps)
 {
-  return !ramps.load.time.empty() || !ramps.speed.time.empty() || !ramps.friction.time.empty();
+  return !ramps.load.at.empty() || !ramps.speed.at.empty() || !ramps.friction.at.empty();
 }
 
 void resolve_friction(Scene& scene)

@@ -217,6 +217,10 @@ SceneKeys keys_of(Contact& c)
        "approach of the surfaces over pressure, as of rough linings, in series with the pairs; of points in m/N; 0: "
        "rigid",
        not_negative, gap},
+      {"slip_compliance", &c.slip_compliance, "m3/N",
+       "elastic slip of a contact that sticks, over shear stress, in series with its friction; of points in m/N; 0: "
+       "rigid",
+       not_negative, gap},
       {"slave", choice_of(c.slave), "word", "side whose nodes have the pairs: the finer or softer one"},
       {"tangents", &c.tangents, "-", "one direction: plane friction along it; or two; when absent, two are chosen",
        direction, drive},
@@ -230,6 +234,8 @@ SceneKeys keys_of(Contact& c)
        "its own mu at rest, with a decay_speed", not_negative, friction},
       {"decay_speed", FrictionTarget{&c.friction, &FrictionLaw::decay_speed}, "m/s", "of its own law, as of [friction]",
        not_negative, friction},
+      {"factor_at_speed", FrictionTableTarget{&c.friction, &FrictionLaw::factor_at_speed}, "table",
+       "of its own law, as of [friction]", not_negative, friction},
   };
 }
 
@@ -281,8 +287,16 @@ SceneKeys keys_of(FrictionLaw& f)
        "mu(s) = coefficient + (static_coefficient - coefficient) exp(-s/decay_speed) at the sliding speed s; 0: "
        "constant",
        not_negative, friction},
+      {"factor_at_speed", &f.factor_at_speed, "table",
+       "mu(s) = coefficient times a factor of the sliding speed s: [[0, 1.5], [0.2, 1]], rows of a speed in m/s and "
+       "the "
+       "factor, straight lines between",
+       not_negative, friction},
       {"direction_damping", &f.direction_damping, "switch",
        "keep the damping mu r_n/abs(v_d) (I - e e') that the friction direction adds to the modes"},
+      {"slipped_pairs_stick", &f.slipped_pairs_stick, "switch",
+       "modes take pairs without a drive that slipped on the load path as stuck; false: as sliding along their last "
+       "friction"},
   };
 }
 
@@ -372,8 +386,8 @@ bool is_absent(const SceneKey& key)
     using Value = std::remove_cvref_t<decltype(value)>;
     if constexpr (std::is_same_v<Value, Vec3>)
       return (key.rule == Rule::direction || key.rule == Rule::velocity) && value == Vec3{};
-    else if constexpr (std::is_same_v<Value, TimeFactor>)
-      return value.time.empty();
+    else if constexpr (std::is_same_v<Value, FactorTable>)
+      return value.at.empty();
     else if constexpr (requires { value.has_value(); })
       return !value.has_value();
     else if constexpr (requires { value.empty(); } && !std::is_same_v<Value, std::string>)
@@ -384,7 +398,8 @@ bool is_absent(const SceneKey& key)
   {
     using Kind = std::remove_cvref_t<decltype(target)>;
     if constexpr (std::is_pointer_v<Kind>) return of_value(*target);
-    if constexpr (requires { target.part; }) return !target.part->has_value();
+    if constexpr (requires { target.part; })
+      return !target.part->has_value() || of_value((**target.part).*target.member);
     if constexpr (std::is_same_v<Kind, TableTarget>) return target.size() == 0;
     return false;
   };

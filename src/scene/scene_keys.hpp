@@ -10,15 +10,16 @@
 namespace squeal
 {
 
-/// A number of an optional part. Setting one of its numbers creates the part.
-template <class Part> struct MemberTarget
+/// A number or a table of an optional part. Setting one of them creates the part.
+template <class Part, class Member> struct MemberTarget
 {
   std::optional<Part>* part;
-  double Part::*member;
+  Member Part::*member;
 };
 
-using DampingTarget = MemberTarget<RayleighDamping>;
-using FrictionTarget = MemberTarget<FrictionLaw>;
+using DampingTarget = MemberTarget<RayleighDamping, double>;
+using FrictionTarget = MemberTarget<FrictionLaw, double>;
+using FrictionTableTarget = MemberTarget<FrictionLaw, FactorTable>;
 
 /// The start of a motion: one of the words, or a state file, which the last word stands for.
 struct StartTarget
@@ -50,8 +51,8 @@ struct TableTarget
 using Target =
     std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*, std::optional<Vec3>*,
                  std::vector<Vec3>*, std::vector<std::string>*, std::vector<double>*, std::vector<int>*,
-                 std::array<double, 6>*, Motions*, std::map<std::string, double>*, TimeFactor*, DampingTarget,
-                 FrictionTarget, StartTarget, std::vector<MeasuredRatio>*, Choice, TableTarget>;
+                 std::array<double, 6>*, Motions*, std::map<std::string, double>*, FactorTable*, DampingTarget,
+                 FrictionTarget, FrictionTableTarget, StartTarget, std::vector<MeasuredRatio>*, Choice, TableTarget>;
 
 /// Whether a key must be given.
 enum class Need

@@ -66,10 +66,10 @@ std::string print(const std::vector<int>& list)
   return list.size() == 1 ? print(list.front()) : print<>(list);
 }
 
-std::string print(const TimeFactor& factor)
+std::string print(const FactorTable& factor)
 {
   std::vector<std::array<double, 2>> rows;
-  for (std::size_t i = 0; i < factor.time.size(); ++i) rows.push_back({factor.time[i], factor.value[i]});
+  for (std::size_t i = 0; i < factor.at.size(); ++i) rows.push_back({factor.at[i], factor.value[i]});
   return print(rows);
 }
 
@@ -85,7 +85,7 @@ std::string print(const std::map<std::string, double>& table)
   return "{" + text + " }";
 }
 
-template <class Part> std::string print(const MemberTarget<Part>& target)
+template <class Part, class Member> std::string print(const MemberTarget<Part, Member>& target)
 {
   return print((**target.part).*target.member);
 }

@@ -13,34 +13,35 @@ namespace squeal
 namespace
 {
 
-/// B ut and B v of a trajectory.
+/// B ut and B v of a trajectory, and its slip positions.
 struct StartOfStep
 {
-  const std::vector<double>&position, &velocity;
+  const std::vector<double>&position, &velocity, &slip;
 };
 
-/// From B v_free of a trajectory: normal rows become gap rates (g0 + B_n ut)/h + B_n v_free, of pairs with a compliance
-/// those of section 4.16, tangential ones sliding velocities. On rank 0; empty elsewhere.
+/// From B v_free of a trajectory: normal rows become gap rates (g0 + B_n ut)/h + B_n v_free, tangential ones sliding
+/// velocities, rows with a compliance as in section 4.16. On rank 0; empty elsewhere.
 std::vector<double> free_contact_velocity(const StepBatch& batch, const StartOfStep& start, std::vector<double> b)
 {
   const auto& [step, interface, factors, works, states, reports] = batch;
   if (b.empty()) return b;
+  const PairRows<std::size_t> rows(interface.directions);
   const PairView velocity(b, interface.directions);
-  const PairView moved(start.position, interface.directions);
   const TangentView drive(interface.drive, interface.directions);
   for (std::size_t i = 0; i < velocity.pairs(); ++i)
-  {
-    const double gap = interface.gap[i] + moved.normal(i);
-    if (const double c = compliance_of(interface, i); c > 0)
-    {
-      const CompliantGap law = compliant_gap(c, step.theta, step.h);
-      const double rate = PairView(start.velocity, interface.directions).normal(i);
-      velocity.normal(i) += law.by_gap * (gap - step.h * (1 - step.theta) * rate) + law.by_rate * rate;
-    }
-    else
-      velocity.normal(i) += gap / step.h;
     for (std::size_t k = 0; k < drive.of(i).size(); ++k)
       velocity.tangential(i)[k] -= factors.drive_end * drive.of(i)[k];
+  const std::vector<double> compliance = compliance_of_rows(interface);
+  for (std::size_t row = 0; row < b.size(); ++row)
+  {
+    const bool normal = rows.is_normal(row);
+    const double c = compliance.empty() ? 0 : compliance[row];
+    if (c == 0 && !normal) continue;
+    const double distance = start.position[row] + (normal ? interface.gap[rows.pair_of(row)] : -start.slip[row]);
+    const CompliantGap law = compliant_gap(c, step.theta, step.h);
+    b[row] += c == 0 ? distance / step.h
+                     : law.by_gap * (distance - step.h * (1 - step.theta) * start.velocity[row]) +
+                           law.by_rate * start.velocity[row];
   }
   return b;
 }
@@ -56,7 +57,8 @@ void hold_anchors(const Interface& interface, const std::vector<double>& positio
   const PairView<double> at(anchors.at, interface.directions);
   for (std::size_t i = 0; i < before.size(); ++i)
   {
-    const bool sticks = is_undriven(interface, i) && before[i] == ContactStatus::stick;
+    const bool sticks =
+        is_undriven(interface, i) && before[i] == ContactStatus::stick && slip_compliance_of(interface, i) == 0;
     if (sticks && !anchors.is_held[i]) at.set(i, PairView(position, interface.directions).vector(i));
     anchors.is_held[i] = sticks;
   }
@@ -102,11 +104,13 @@ std::vector<StepProblem> make_problems(const StepBatch& batch, const std::vector
   {
     const std::vector<double>&position = motion[2 * k], &velocity = motion[2 * k + 1];
     const auto first = Bv_free.begin() + static_cast<std::ptrdiff_t>(k) * size;
-    problems[k].free = free_contact_velocity(batch, {position, velocity}, {first, first + size});
-    const std::vector<ContactStatus> before =
+    problems[k].free = free_contact_velocity(batch, {position, velocity, states[k].slip}, {first, first + size});
+    std::vector<ContactStatus> before =
         status_with(interface, law_before, factors.drive_start, states[k].reactions, velocity);
     hold_anchors(interface, position, before, works[k].anchors);
     lead_back(batch, position, works[k].anchors, problems[k].free);
+    for (std::size_t i = 0; i < before.size(); ++i) // slip positions have no velocity of the step's start
+      if (slip_compliance_of(interface, i) > 0) before[i] = ContactStatus::stick;
     problems[k].past = past_sliding(PairView(velocity, interface.directions),
                                     TangentView<const double>(drive, interface.directions), before, weight);
   }

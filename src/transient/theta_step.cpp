@@ -75,6 +75,17 @@ std::vector<double> joint_work(const StepBatch& batch, const State& state, Vec v
   return work;
 }
 
+/// Moves the slip positions of pairs that do not stick, to those at u_theta. Collective.
+void move_slip(const StepBatch& batch, const std::vector<ContactStatus>& statuses, StepWork& work, State& state)
+{
+  if (state.slip.empty()) return;
+  check(VecWAXPY(work.f, -batch.step.h * (1 - batch.step.theta), work.v_theta, state.u)); // u_theta
+  const std::vector<double> moved = slip_positions(batch.interface, work.f, state.reactions);
+  const PairView<double> slip(state.slip, batch.interface.directions);
+  for (std::size_t i = 0; i < statuses.size(); ++i)
+    if (statuses[i] != ContactStatus::stick) slip.set(i, PairView(moved, batch.interface.directions).vector(i));
+}
+
 /// Works of each step from the products at both ends; all reductions in one message.
 void account(const StepBatch& batch, const Structure& structure)
 {
@@ -250,12 +261,8 @@ namespace
 /// What the compliance of the pairs adds to the diagonal of W; empty: nothing.
 std::vector<double> added_by_compliance(const ThetaStep& step, const Interface& interface)
 {
-  std::vector<double> added;
-  if (interface.compliance.empty()) return added;
-  added.assign(interface.size(), 0.);
-  const PairView<double> rows(added, interface.directions);
-  for (std::size_t i = 0; i < rows.pairs(); ++i)
-    rows.normal(i) = compliant_gap(compliance_of(interface, i), step.theta, step.h).by_reaction;
+  std::vector<double> added = compliance_of_rows(interface);
+  for (double& c : added) c = compliant_gap(c, step.theta, step.h).by_reaction;
   return added;
 }
 
@@ -332,6 +339,13 @@ StepWork begin_steps(const ThetaStep& step, const Structure& structure, const In
   check(VecDot(state.u, work.Ku, &potential));
   work.energy = (kinetic + potential) / 2;
   state.reactions.resize(interface.size(), 0);
+  if (!has_elastic_slip(interface))
+    state.slip.clear();
+  else if (state.slip.empty())
+    state.slip = slip_positions(interface, state.u, state.reactions);
+  else if (state.slip.size() != interface.size())
+    throw Error(format("the state has %zu slip positions, contact %zu rows: it was written by another scene",
+                       state.slip.size(), interface.size()));
   return work;
 }
 
@@ -386,11 +400,13 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
     StepWork& work = works[k];
     std::vector<double> velocity;
     if (depends_on_speed(friction)) velocity = relative(interface, work.v_next);
-    for (const ContactStatus status :
-         status_with(interface, friction, factors.drive_end, states[k].reactions, std::move(velocity)))
+    const std::vector<ContactStatus> statuses =
+        status_with(interface, friction, factors.drive_end, states[k].reactions, std::move(velocity));
+    for (const ContactStatus status : statuses)
       ++(status == ContactStatus::open    ? reports[k].open
          : status == ContactStatus::stick ? reports[k].stick
                                           : reports[k].slip);
+    move_slip(batch, statuses, work, states[k]);
     if (work.record) record_rates(step, work);
     check(VecCopy(work.v_next, states[k].v));
     std::swap(work.Mv, work.Mv_next);

@@ -98,8 +98,8 @@ bool slides_as_at_equilibrium(const Interface& interface, const Equilibrium& equ
 double largest_friction(const Ramps& ramps)
 {
   std::vector<double> times{0};
-  for (const TimeFactor* factor : {&ramps.load, &ramps.friction})
-    times.insert(times.end(), factor->time.begin(), factor->time.end());
+  for (const FactorTable* factor : {&ramps.load, &ramps.friction})
+    times.insert(times.end(), factor->at.begin(), factor->at.end());
   std::sort(times.begin(), times.end());
   double largest = factor_at(ramps.load, 0) * factor_at(ramps.friction, 0);
   for (std::size_t i = 1; i < times.size(); ++i)
@@ -182,7 +182,8 @@ void describe(Checkpoint& checkpoint, const MarchProgress& progress)
   State& state = progress.state;
   describe_all(checkpoint, summary.steps, summary.unconverged, summary.as_one, summary.first_unconverged,
                summary.contact_residual_max, summary.fall_of_friction_max, summary.energy_defect_max,
-               progress.iterations, state.time, state.reactions, progress.history.probes, progress.history.joint_work);
+               progress.iterations, state.time, state.reactions, state.slip, progress.history.probes,
+               progress.history.joint_work);
   for_each_series([&](auto, auto, auto& series) { describe(checkpoint, series); }, progress.history);
   const FileOrder order(progress.structure);
   order.describe(checkpoint, state.u);
@@ -254,7 +255,11 @@ TransientSettings planned(TransientSettings settings, const ComplexMode& mode)
   return settings;
 }
 
-State transient_start(const SlidingEquilibrium& sliding, const UnstableModes& unstable,
+namespace
+{
+
+/// But for slip positions, unless a file has them.
+State start_of_motion(const SlidingEquilibrium& sliding, const UnstableModes& unstable,
                       const TransientSettings& settings)
 {
   if (settings.start.kind == StartKind::file) return read_state(settings.start.file, sliding.structure);
@@ -271,6 +276,19 @@ State transient_start(const SlidingEquilibrium& sliding, const UnstableModes& un
   for (std::size_t i = 1; i < unstable.modes.size(); ++i)
     if (const auto motion = estimated_motion(sliding.equilibrium, unstable.modes[i], unstable.estimates[i]))
       add_motion(*motion, 1, start);
+  return start;
+}
+
+} // namespace
+
+State transient_start(const SlidingEquilibrium& sliding, const UnstableModes& unstable,
+                      const TransientSettings& settings)
+{
+  State start = start_of_motion(sliding, unstable, settings);
+  if (settings.start.kind == StartKind::rest)
+    start.slip.assign(sliding.interface.size(), 0.);
+  else if (settings.start.kind != StartKind::file)
+    start.slip = slip_positions(sliding.interface, sliding.equilibrium.u, sliding.equilibrium.reactions);
   return start;
 }
 

@@ -1,5 +1,7 @@
 """Contacts that nothing drives, from a scene file: a pad between the disc it rubs on and the abutment that holds it."""
 
+import struct
+
 import pytest
 
 SCENE = """
@@ -43,8 +45,7 @@ stator = "bracket"
 normal = "x"
 tangents = ["y"]
 {joint}
-[friction]
-coefficient = 0.4
+{friction}
 [modes]
 band = 5000
 {more}
@@ -53,9 +54,10 @@ band = 5000
 
 @pytest.fixture
 def scene(tmp_path):
-    def write(force=-1000, joint="", more=""):
+    def write(force=-1000, joint="", more="", friction=""):
         file = tmp_path / "scene.toml"
-        file.write_text(SCENE.format(force=force, joint=joint, more=more))
+        friction = "[friction]\ncoefficient = 0.4\n" + friction
+        file.write_text(SCENE.format(force=force, joint=joint, more=more, friction=friction))
         return file
 
     return write
@@ -94,7 +96,31 @@ def test_a_start_in_motion_is_given_by_keys(scene, converged):
     assert len(transient["joint_work"]) == 2 and transient["joint_work"][1] < 1e-12
 
 
-def test_what_does_not_know_such_contacts_says_so(scene, squeal):
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_elastic_slip_goes_on_from_a_state_file(scene, converged, tmp_path, ranks):
+    def state_after(steps, start, name):
+        file = scene(joint="slip_compliance = 2e-8",
+                     more=f'[transient]\nstart = "{start}"\nsteps = {steps}\nstep_size = 1e-5\nsave_state = "{name}"\n'
+                          'load_factor = [[0, 0.4]]\n')
+        return converged(file, ranks=ranks).report["equilibrium"]["contacts"][0]["normal_force_sum"], (tmp_path / name).read_bytes()
+
+    clamp, _ = state_after(50, "equilibrium", "middle.state")
+    assert clamp == pytest.approx(1000 / 1.16, rel=0.3)
+    _, twice = state_after(50, "middle.state", "twice.state")
+    _, once = state_after(100, "equilibrium", "once.state")
+    assert len(once) == len(twice) == 3 * 8 + 8 * (4 + 4 + 4)
+    vectors = [[text[i:i + 32] for i in (8, 48, 88)] for text in (once, twice)]
+    for one, other in zip(*vectors):
+        assert struct.unpack(">4d", one) == pytest.approx(struct.unpack(">4d", other), rel=1e-6, abs=1e-12)
+
+
+def test_friction_by_a_table_is_that_of_the_drive(scene, converged):
+    table = "factor_at_speed = [[0, 2], [0.5, 1.5], [1.5, 0.5]]\n"  # 1 at the drive's 1 m/s
+    clamp = converged(scene(joint="friction = 0.4", friction=table), ranks=1)
+    assert clamp.report["equilibrium"]["contacts"][0]["normal_force_sum"] == pytest.approx(1000 / 1.16, rel=1e-9)
+
+
+def test_what_does_not_know_such_contacts_says_so(scene, squeal, tmp_path):
     wrong = {
         "[cycle] does not know": "[cycle]\n",
         "is the last one": step("press", load=0.5),
@@ -102,6 +128,13 @@ def test_what_does_not_know_such_contacts_says_so(scene, squeal):
         "moves nothing": '[transient]\n[[initial]]\non = "pad"\n',
         "[sensitivity] does not know": "[sensitivity]\n",
     }
-    for words, more in wrong.items():
-        run = squeal(scene(more=more), ranks=1)
+    runs = {words: scene(more=more).read_text() for words, more in wrong.items()}
+    runs |= {words: scene(joint=joint).read_text() for words, joint in {
+        "factor_at_speed is on a coefficient": "factor_at_speed = [[0, 2], [1, 1]]",
+        "does not change with the speed": "friction = 0.3\nslip_compliance = 1e-9\nfactor_at_speed = [[0, 2], [1, 1]]",
+        "one with a rotation or velocity slides": "velocity = [0, 0, 1]\nslip_compliance = 1e-9",
+    }.items()}
+    for words, text in runs.items():
+        (tmp_path / "wrong.toml").write_text(text)
+        run = squeal(tmp_path / "wrong.toml", ranks=1)
         assert run.code not in (0, 3) and words in run.errors, (words, run.code, run.errors)

@@ -247,3 +247,19 @@ TEST_CASE("what is not a number ends as not converged")
   Vector W = {1, 0, 0, 1}, r;
   CHECK_FALSE(solve_contact(make_contact_operator(W, 1, 1), {std::nan(""), 0}, {0.3}, {}, r).converged);
 }
+
+TEST_CASE("a contact that carries little is judged by what it carries, beside one that carries much")
+{
+  const ContactOperator W = make_contact_operator({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, 2, 1);
+  const Vector b = {-2e4, 0, -2e4, 0};
+  const Vector r = {2e4, 0, 2e4, 1e-2};
+  PairFriction friction(FrictionLaw{0.4});
+  const double together = contact_residual(W, friction, b, r);
+  friction.contact = {0, 1};
+  CHECK(contact_residual(W, friction, b, r) == doctest::Approx(together).epsilon(1e-12));
+  const Vector light_b = {-2e4, 0, -10, 0}, light_r = {2e4, 0, 10, 1e-2};
+  CHECK(contact_residual(W, friction, light_b, light_r) == doctest::Approx(1e-3).epsilon(1e-3));
+  const Vector status_of = {2e4, 0, 1e-5, 0};
+  CHECK(contact_status(PairView<const double>(status_of, 1), PairView<const double>(status_of, 1), friction)[1] ==
+        ContactStatus::stick);
+}

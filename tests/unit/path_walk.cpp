@@ -2,6 +2,8 @@
 // Statuses of pairs without a drive along load paths with exact answers, on dense condensed operators.
 #include "squeal/equilibrium/path_walk.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <doctest/doctest.h>
 #include <Eigen/Dense>
@@ -239,4 +241,172 @@ TEST_CASE("a pad clamped between a driven face and a joint slides away where fri
   CHECK_FALSE(walk.completed);
   CHECK(walk.step == 1);
   CHECK(walk.part == doctest::Approx(.975).epsilon(1e-5));
+}
+
+TEST_CASE("a bar on a rough base slips from its end on, by the square of the force, and leaves a loop")
+{
+  constexpr double EA = 1e6, rough = 1e4, length = .1, mu = .5, kappa = 1e6;
+  constexpr Index elements = 50, nodes = elements + 1;
+  constexpr double size = length / elements;
+  MatrixXd K = MatrixXd::Zero(2 * nodes, 2 * nodes), B = MatrixXd::Zero(2 * nodes, 2 * nodes); // x, then y
+  VectorXd pressed = VectorXd::Zero(2 * nodes), pulled = VectorXd::Zero(2 * nodes);
+  for (Index i = 0; i < nodes; ++i)
+  {
+    const bool end = i == 0 || i == elements;
+    B(2 * i, nodes + i) = B(2 * i + 1, i) = 1;
+    pressed[nodes + i] = -rough * size / mu * (end ? .5 : 1);
+    if (i < elements) K.block<2, 2>(i, i) += EA / size * rows_of({{1, -1}, {-1, 1}});
+  }
+  pulled[elements] = 1;
+  Planar bar(K, B, std::vector<double>(nodes, mu), kappa);
+  bar.step(pressed, 1);
+  const auto moved_at = [&](double force)
+  {
+    bar.step(pressed + force * pulled, 1);
+    const PathWalk walk = walk_path(bar.problem());
+    REQUIRE(walk.completed);
+    return bar.displacement(walk, pressed + force * pulled)[elements];
+  };
+  constexpr double F = 800, exact = F * F / (2 * EA * rough); // the front is at a node
+  CHECK(moved_at(F) == doctest::Approx(exact).epsilon(1e-9));
+  const PathWalk pulled_out = walk_path(bar.problem());
+  const std::vector<ContactStatus> statuses = StatusSystem(bar.of, pulled_out.friction, pulled_out.state).statuses();
+  const auto sticking = std::ranges::count(statuses, ContactStatus::stick);
+  CHECK(std::abs(static_cast<double>(nodes - sticking) * size - F / rough) <= size);
+  // a parabola each way: the work of F in the loop follows from its ends and its middle
+  const double back = moved_at(0), turned = moved_at(-F), forth = moved_at(0), closed = moved_at(F);
+  CHECK(turned == doctest::Approx(-exact).epsilon(1e-9));
+  CHECK(closed == doctest::Approx(exact).epsilon(1e-9));
+  CHECK(4. / 3 * F * (back - forth) == doctest::Approx(2. / 3 * F * F * F / (EA * rough)).epsilon(1e-9));
+  bar.step(pressed + 1200 * pulled, 1); // more than friction of the whole bar
+  const PathWalk whole = walk_path(bar.problem());
+  CHECK_FALSE(whole.completed);
+  CHECK(F + whole.part * (1200 - F) == doctest::Approx(rough * length).epsilon(1e-5));
+}
+
+namespace
+{
+
+/// Two equal spheres without Poisson's ratio on a grid of squares: the half-space's motion by even pressure on each.
+struct Spheres
+{
+  static constexpr double R = 100, approach = .01, mu = .5, G = 1;
+  static constexpr Index across = 14;
+  double radius = std::sqrt(R * approach), size = 2.1 * radius / across;
+  double load = 4. / 3 * std::sqrt(R) * std::pow(approach, 1.5);
+  double reach = 3 * mu * load / (16 * radius) * 4 / G; // motion at which all slips
+  StickSlipOperator of{};
+  std::vector<double> gap{};
+  std::vector<PathEnd> ends{};
+
+  Spheres()
+  {
+    std::vector<std::array<double, 2>> at;
+    for (Index i = 0; i < across * across; ++i)
+      at.push_back({(static_cast<double>(i % across) - (across - 1) / 2.) * size,
+                    (static_cast<double>(i / across) - (across - 1) / 2.) * size});
+    const auto pairs = static_cast<Index>(at.size());
+    MatrixXd D = MatrixXd::Zero(2 * pairs, 2 * pairs);
+    for (Index i = 0; i < pairs; ++i)
+      for (Index j = 0; j < pairs; ++j)
+      {
+        const auto& a = at[static_cast<std::size_t>(i)];
+        const auto& b = at[static_cast<std::size_t>(j)];
+        D(2 * i, 2 * j) = D(2 * i + 1, 2 * j + 1) =
+            square(a[0] - b[0], a[1] - b[1], size / 2) / (M_PI * G * size * size); // of both bodies
+      }
+    for (const auto& [x, y] : at) gap.push_back((x * x + y * y) / (2 * R));
+    of = make_stick_slip_operator(MatrixXd::Identity(2 * pairs, 2 * pairs), D, 1,
+                                  std::vector<int>(static_cast<std::size_t>(pairs), 0));
+    move(0);
+  }
+
+  /// The integral of 1/distance over a square of half a side b, from (x, y) of its middle.
+  static double square(double x, double y, double b)
+  {
+    const auto part = [](double u, double v)
+    { return u * std::asinh(v / std::abs(u)) + v * std::asinh(u / std::abs(v)); };
+    x += 1e-13;
+    y += 1.3e-13;
+    return part(x + b, y + b) - part(x - b, y + b) - part(x + b, y - b) + part(x - b, y - b);
+  }
+
+  void move(double along)
+  {
+    VectorXd q(of.M.rows());
+    for (Index i = 0; i < q.size(); i += 2) q[i] = -approach, q[i + 1] = -along;
+    ends.push_back({"move", q, 1});
+  }
+
+  PathWalk walk() const
+  {
+    return walk_path({of, 0, gap, {std::vector<double>(gap.size(), mu), std::vector<double>(gap.size(), 0.)}, ends});
+  }
+};
+
+double sum_of(const PathWalk& walk, Index component)
+{
+  double sum = 0;
+  for (Index i = component; i < walk.state.r.size(); i += 2) sum += walk.state.r[i];
+  return sum;
+}
+
+} // namespace
+
+TEST_CASE("two spheres stick inside a ring of slip as Cattaneo and Mindlin say, and unload along another curve")
+{
+  Spheres spheres;
+  const double N = sum_of(spheres.walk(), 0);
+  CHECK(N == doctest::Approx(spheres.load).epsilon(1e-2));
+  constexpr double part = .6; // of mu N
+  spheres.move(spheres.reach * (1 - std::pow(1 - part, 2. / 3)));
+  const PathWalk moved = spheres.walk();
+  REQUIRE(moved.completed);
+  CHECK(sum_of(moved, 1) / (Spheres::mu * N) == doctest::Approx(part).epsilon(1e-2));
+  const std::vector<ContactStatus> statuses = StatusSystem(spheres.of, moved.friction, moved.state).statuses();
+  const auto sticking = static_cast<double>(std::ranges::count(statuses, ContactStatus::stick));
+  CHECK(std::sqrt(sticking / M_PI) * spheres.size / spheres.radius ==
+        doctest::Approx(std::cbrt(1 - part)).epsilon(5e-2));
+  const double back = 2 * spheres.reach * (1 - std::pow(1 - part / 2, 2. / 3)); // until the force is zero again
+  spheres.move(spheres.reach * (1 - std::pow(1 - part, 2. / 3)) - back);
+  CHECK(std::abs(sum_of(spheres.walk(), 1)) < 1e-2 * Spheres::mu * N);
+}
+
+TEST_CASE("pairs that stick leave the unknowns where reactions stand alone, and the answer and its index stay")
+{
+  // a row of masses on springs, each pressed onto the ground, that is pulled at its end
+  constexpr Index masses = 6;
+  MatrixXd K = MatrixXd::Zero(2 * masses, 2 * masses), B = K;
+  VectorXd pressed = VectorXd::Zero(2 * masses), pulled = pressed;
+  for (Index i = 0; i < masses; ++i)
+  {
+    B(2 * i, masses + i) = B(2 * i + 1, i) = 1;
+    K(masses + i, masses + i) = 3;
+    K(i, masses + i) = K(masses + i, i) = .2;
+    pressed[masses + i] = -1;
+    if (i + 1 < masses) K.block<2, 2>(i, i) += rows_of({{2, -2}, {-2, 2}});
+  }
+  K.topLeftCorner(masses, masses).diagonal().array() += .3;
+  pulled[masses - 1] = 1.2;
+  Planar row(K, B, std::vector<double>(masses, .4), .5);
+  row.step(pressed, 1);
+  row.step(pressed + pulled, 1);
+  const PathWalk walk = walk_path(row.problem());
+  REQUIRE(walk.completed);
+  StickSlipOperator of = row.of;
+  const std::optional<DividedOperator> stiff = divided(of);
+  REQUIRE(stiff);
+  PathProblem problem{stiff->of, 1, row.problem().gap, row.problem().friction, row.ends};
+  for (PathEnd& end : problem.ends) end.q = stiff->by.solve(end.q);
+  const PathWalk same = walk_path(problem);
+  REQUIRE(same.completed);
+  CHECK(distance(same.state.r, walk.state.r) < 1e-11);
+  CHECK(distance(same.state.w, walk.state.w) < 1e-11);
+  const StatusSystem by_compliance(row.of, walk.friction, walk.state),
+      by_stiffness(stiff->of, same.friction, same.state);
+  CHECK(std::ranges::count(by_stiffness.statuses(), ContactStatus::slip) > 0);
+  CHECK(by_compliance.statuses() == by_stiffness.statuses());
+  CHECK(by_compliance.index() == by_stiffness.index());
+  StickSlipOperator twice = make_stick_slip_operator(MatrixXd::Identity(4, 4), MatrixXd::Ones(4, 4), 1, {0, 0});
+  CHECK_FALSE(divided(twice)); // rows that depend on each other: as they are
 }

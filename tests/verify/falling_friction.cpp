@@ -192,3 +192,27 @@ TEST_CASE("stick-slip has the period of slip by quadrature and stick")
   // of order 2 but for the steps in which stick begins and ends, whose share depends on where they fall in the grid
   CHECK(std::abs(errors[0]) / std::abs(errors[2]) > 64);
 }
+
+TEST_CASE("a block comes to rest under friction along the lines of a table, of second order, and stays there")
+{
+  // m v' = -N mu(v), mu = c (1.5 - v) up to v = 0.5: 1.5 - v grows by exp(N c t/m)
+  constexpr double m = 2, N = 3, c = 0.3, start = 0.45, end = 0.5, rate = N * c / m;
+  SmallModel model;
+  model.structure = test::make_structure(diagonal({m, 1}), diagonal({0, 0}), diagonal({0, 1}), {0, -N});
+  model.interface = test::make_interface({{0, 1}, {1, 0}}, 1, {0}, {0}, c, model.structure.K);
+  model.interface.friction.common.factor_at_speed = {{0, 0.5}, {1.5, 1}};
+  const auto speed_after = [&](double time, int steps)
+  {
+    const ThetaStep step = make_theta_step(model.structure, model.interface, time / steps, 0.5, {});
+    State state = state_of(model.structure, {0, 0}, {start, 0});
+    StepWork work = begin_steps(step, model.structure, model.interface, state);
+    for (int i = 0; i < steps; ++i)
+      CHECK(advance(step, model.structure, model.interface, work, state).contact_converged);
+    return all_entries(state.v)[0];
+  };
+  const double exact = 1.5 - (1.5 - start) * std::exp(rate * end);
+  const double coarse = std::abs(speed_after(end, 50) - exact), fine = std::abs(speed_after(end, 100) - exact);
+  CHECK(fine < 1e-5);
+  CHECK(fine < 0.3 * coarse);
+  CHECK(std::abs(speed_after(1, 100)) < 1e-10); // it rests from t = ln(1.5/1.05)/rate = 0.79 on
+}

@@ -87,7 +87,7 @@ void check_second_order(const SmallModel& model, const Ramps& ramps, double end,
 
 TEST_CASE("a factor of time is a polygon that is constant outside of its times")
 {
-  const TimeFactor factor{{1, 2, 4}, {3, 5, -1}};
+  const FactorTable factor{{1, 2, 4}, {3, 5, -1}};
   CHECK(factor_at({}, 7) == 1);
   CHECK(factor_at(factor, 0) == 3);
   CHECK(factor_at(factor, 1.5) == 4);

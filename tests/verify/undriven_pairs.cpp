@@ -1,9 +1,11 @@
 // ranks: 1 2 3
 // Contacts without a drive in time, at rest and in modes, against exact answers.
 #include "../support/linearised.hpp"
+#include "../support/temporary_folder.hpp"
 #include "squeal/transient/theta_step.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <doctest/doctest.h>
 
@@ -42,10 +44,18 @@ struct Turns
   double end = 0, work = 0, energy_lost = 0;
 };
 
-Turns turns_of(const SmallModel& model, const std::vector<double>& start, double h, int steps)
+/// The top of the parabola through three samples.
+double top_of(double a, double b, double c)
+{
+  return b - (c - a) * (c - a) / (8 * (a - 2 * b + c));
+}
+
+/// `slip`: positions of friction, empty where it has no elastic slip.
+Turns turns_of(const SmallModel& model, const std::vector<double>& start, const std::vector<double>& slip, double h,
+               int steps)
 {
   const ThetaStep step = make_theta_step(model.structure, model.interface, h, 0.5, {});
-  State state{test::vector_like(model.structure.K, start), zeros_like(model.structure.load), 0, {}};
+  State state{test::vector_like(model.structure.K, start), zeros_like(model.structure.load), 0, {}, slip};
   StepWork work = begin_steps(step, model.structure, model.interface, state);
   const double energy = work.energy;
   Turns turns;
@@ -58,8 +68,7 @@ Turns turns_of(const SmallModel& model, const std::vector<double>& start, double
     turns.work += report.joint_work.at(0);
     x = {all_entries(state.u)[0], x[0], x[1]};
     const double before = x[1] - x[2], after = x[0] - x[1];
-    if (i > 0 && before * after < 0) // the top of the parabola through three steps
-      turns.at.push_back(x[1] - std::pow(x[0] - x[2], 2) / (8 * (x[0] - 2 * x[1] + x[2])));
+    if (i > 0 && before * after < 0) turns.at.push_back(top_of(x[0], x[1], x[2]));
   }
   turns.end = x[0];
   turns.energy_lost = energy - work.energy;
@@ -83,7 +92,7 @@ SmallModel pad_in_abutment(double force)
 TEST_CASE("a block on a rough plane swings a tenth less each half period, and rests")
 {
   const double T = 2 * M_PI / std::sqrt(1000.);
-  const Turns turns = turns_of(sliding_block(1000), {0.85, 0}, T / 200, 1000);
+  const Turns turns = turns_of(sliding_block(1000), {0.85, 0}, {}, T / 200, 1000);
   REQUIRE(turns.at.size() >= 7);
   for (std::size_t i = 0; i < 7; ++i)
     CHECK(std::abs(turns.at[i]) == doctest::Approx(0.75 - 0.1 * static_cast<double>(i)).epsilon(4e-4));
@@ -98,7 +107,7 @@ TEST_CASE("a spring with a friction element decays to the exact solution as step
   const auto error_with = [&](int steps_a_period)
   {
     const Turns turns =
-        turns_of(rubbing_block(600, 400), {0.4, 0.4 - 50. / 400, 0}, T / steps_a_period, 4 * steps_a_period);
+        turns_of(rubbing_block(600, 400), {0.4, 0.4 - 50. / 400, 0}, {}, T / steps_a_period, 4 * steps_a_period);
     REQUIRE(turns.at.size() >= exact.size());
     double worst = 0;
     for (std::size_t i = 0; i < exact.size(); ++i) worst = std::max(worst, std::abs(turns.at[i] - exact[i]));
@@ -181,4 +190,257 @@ TEST_CASE("modes take a pair without a drive as held in all its motions")
   REQUIRE(stuck.size() == 2);
   REQUIRE(exact.size() == 2);
   for (std::size_t i = 0; i < 2; ++i) CHECK(stuck[i] == doctest::Approx(exact[i]).epsilon(1e-9));
+}
+
+namespace
+{
+
+/// A block on a spring k0 and a spring of compliance c_t in series with its friction, pressed by 100 N.
+SmallModel elastic_block(double k0, double kt, double damping)
+{
+  SmallModel model;
+  model.structure =
+      test::make_structure(test::diagonal({1, .01}), test::diagonal({damping, 0}), test::diagonal({k0, 0}), {0, -100});
+  model.interface = test::make_interface({{0, 1}, {1, 0}}, 1, {0}, {0}, 0.5, model.structure.K);
+  model.interface.slip_compliance = {1 / kt};
+  return model;
+}
+
+/// Half of the last period's peak to peak under a force F cos(omega t), by parabolas through the extremes.
+double forced_amplitude(double omega, int steps_a_period)
+{
+  constexpr double F = 60;
+  constexpr int periods = 50;
+  const SmallModel model = elastic_block(600, 400, 2);
+  const double h = 2 * M_PI / omega / steps_a_period;
+  const ThetaStep step = make_theta_step(model.structure, model.interface, h, 0.5, {});
+  State state{zeros_like(model.structure.load), zeros_like(model.structure.load), 0, {}};
+  StepWork work = begin_steps(step, model.structure, model.interface, state);
+  std::vector<double> x;
+  for (int i = 0; i < periods * steps_a_period; ++i)
+  {
+    const double force = F * (std::cos(omega * h * i) + std::cos(omega * h * (i + 1))) / 2;
+    check(VecCopy(test::vector_like(model.structure.K, {force, -100}), model.structure.load));
+    (void)advance(step, model.structure, model.interface, work, state);
+    x.push_back(all_entries(state.u)[0]);
+  }
+  const std::size_t n = static_cast<std::size_t>(steps_a_period), first = x.size() - n;
+  const auto peak = [&](double sign)
+  {
+    std::size_t top = 0;
+    for (std::size_t i = 1; i < n; ++i)
+      if (sign * x[first + i] > sign * x[first + top]) top = i;
+    return top_of(sign * x[first + (top + n - 1) % n], sign * x[first + top], sign * x[first + (top + 1) % n]);
+  };
+  return (peak(1) + peak(-1)) / 2;
+}
+
+} // namespace
+
+TEST_CASE("elastic slip in series with friction decays to the exact solution, of second order through stick and slip")
+{
+  const std::vector<double> exact = {-.293422, .209590, -.156682, .133569, -.126882, .125384};
+  const double T = 2 * M_PI / std::sqrt(1000.);
+  const auto error_with = [&](int steps_a_period)
+  {
+    const Turns turns =
+        turns_of(elastic_block(600, 400, 0), {.4, 0}, {0, .4 - 50. / 400}, T / steps_a_period, 4 * steps_a_period);
+    REQUIRE(turns.at.size() >= exact.size());
+    double worst = 0;
+    for (std::size_t i = 0; i < exact.size(); ++i) worst = std::max(worst, std::abs(turns.at[i] - exact[i]));
+    return worst;
+  };
+  const double coarse = error_with(100), fine = error_with(200);
+  CHECK(fine < 2e-4);
+  CHECK(fine < 0.3 * coarse);
+}
+
+TEST_CASE("a block on a spring and an elastic friction element swings under a force as it does exactly")
+{
+  for (const auto& [omega, exact] : {std::pair{22., .115858618}, {26., .323049746}, {30., .271085402}})
+  {
+    const double error = std::abs(forced_amplitude(omega, 200) / exact - 1);
+    INFO(omega, " rad/s: ", error);
+    CHECK(error < 3e-4);
+  }
+  const double coarse = std::abs(forced_amplitude(26, 100) / .323049746 - 1);
+  CHECK(std::abs(forced_amplitude(26, 200) / .323049746 - 1) < 0.3 * coarse);
+}
+
+TEST_CASE("elastic slip holds a rest with locked-in friction where it is, and takes its own place in a state file")
+{
+  SmallModel model = pad_in_abutment(1000);
+  model.interface.slip_compliance = {0, 2e-8};
+  const Equilibrium rest = find_equilibrium(model.structure, model.interface, {});
+  CHECK(rest.outcome.kind == OutcomeKind::converged);
+  CHECK(rest.force_residual < 1e-12);
+  const ThetaStep step = make_theta_step(model.structure, model.interface, 1e-4, 0.5, {});
+  State state{copy_of(rest.u.get()), zeros_like(rest.u), 0, rest.reactions};
+  StepWork work = begin_steps(step, model.structure, model.interface, state);
+  const std::vector<double> slip = state.slip;
+  for (int i = 0; i < 300; ++i) (void)advance(step, model.structure, model.interface, work, state);
+  double moved = 0, size = 0;
+  check(VecNorm(rest.u, NORM_INFINITY, &size));
+  check(VecAXPY(state.u, -1, rest.u));
+  check(VecNorm(state.u, NORM_INFINITY, &moved));
+  CHECK(moved < 1e-9 * size);
+  const test::TemporaryFolder folder;
+  write_state(state, model.structure, folder.path / "state");
+  CHECK(read_state(folder.path / "state", model.structure).slip == state.slip);
+}
+
+TEST_CASE("modes with elastic slip tend to those of stick with the first power of its compliance")
+{
+  const double a = 3e4, b = 1e4;
+  const Rows K = {{a + 2e4, 1e3, -a, 0}, {1e3, b + 1e4, 0, -b}, {-a, 0, a + 5e3, 2e3}, {0, -b, 2e3, b + 7e3}};
+  const auto eigenvalues_with = [&](double slip_compliance)
+  {
+    SmallModel model;
+    model.structure = test::make_structure(test::diagonal({1, 1, 2, 2}), test::zeros(4, 4), K, {0, -100, 0, -10});
+    model.interface = test::make_interface({{0, 1, 0, 0}, {1, 0, 0, 0}}, 1, {0}, {0}, 0.5, model.structure.K);
+    if (slip_compliance > 0) model.interface.slip_compliance = {slip_compliance};
+    ModesSettings settings;
+    settings.band = 1e6;
+    std::vector<double> found;
+    const Equilibrium rest = find_equilibrium(model.structure, model.interface, {});
+    for (const ComplexMode& mode : test::modes_of(model, rest, settings, {}).modes)
+      found.push_back(std::abs(mode.lambda.imag()));
+    return found;
+  };
+  const std::vector<double> stuck = eigenvalues_with(0), some = eigenvalues_with(1e-9), less = eigenvalues_with(1e-10);
+  REQUIRE(stuck.size() == 2);
+  REQUIRE(some.size() == 3); // one more, of the mass on the elastic slip
+  for (std::size_t i = 0; i < 2; ++i)
+  {
+    CHECK(std::abs(some[i] / stuck[i] - 1) < 1e-4);
+    if (i == 0) CHECK((less[i] - stuck[i]) / (some[i] - stuck[i]) == doctest::Approx(0.1).epsilon(1e-2));
+  }
+}
+
+namespace
+{
+
+/// The oscillator that squeals (pad x y, disc y) with its x spring on a bracket of three nodes in a row, which friction
+/// on the ground holds under preloads of their own: motions pad x y, disc y, nodes x, nodes y.
+SmallModel mounted_oscillator(const std::array<double, 3>& preload, double damping)
+{
+  Rows K = test::zeros(9, 9), C = K;
+  const auto add_spring = [](Rows& matrix, std::size_t a, std::size_t b, double k)
+  {
+    matrix[a][a] += k;
+    if (a == b) return;
+    matrix[b][b] += k;
+    matrix[a][b] -= k;
+    matrix[b][a] -= k;
+  };
+  add_spring(K, 0, 3, 1);
+  add_spring(K, 1, 1, .4);
+  add_spring(K, 0, 1, .1);
+  add_spring(K, 2, 2, 1.2);
+  add_spring(K, 3, 4, 4);
+  add_spring(K, 4, 5, 4);
+  add_spring(K, 5, 5, .05);
+  add_spring(C, 0, 3, damping);
+  for (const auto& [a, b] : {std::pair{1, 1}, {2, 2}, {3, 4}, {4, 5}})
+    add_spring(C, static_cast<std::size_t>(a), static_cast<std::size_t>(b), damping);
+  SmallModel model;
+  model.structure = test::make_structure(test::diagonal({1, 1, .5, .05, .05, .05, .05, .05, .05}), C, K,
+                                         {0, -1, 0, 0, 0, 0, -preload[0], -preload[1], -preload[2]});
+  Rows B = test::zeros(8, 9);
+  B[0][1] = 1;
+  B[0][2] = -1;
+  B[1][0] = 1;
+  for (std::size_t i = 0; i < 3; ++i) B[2 + 2 * i][6 + i] = B[3 + 2 * i][3 + i] = 1;
+  model.interface = test::make_interface(B, 1, {0, 0, 0, 0}, {.6, 0, 0, 0}, .3, model.structure.K);
+  model.interface.friction.own = {FrictionLaw{.5}};
+  model.interface.friction.number_of_own = {-1, 0, 0, 0};
+  return model;
+}
+
+/// The joints pressed, then the pad, then the disc turned.
+void turn_after_pressing(SmallModel& model)
+{
+  const auto joints = copy_of(model.structure.load.get());
+  check(VecSetValue(joints, 1, 0, INSERT_VALUES));
+  check(VecAssemblyBegin(joints));
+  check(VecAssemblyEnd(joints));
+  model.structure.path.push_back({"joints", copy_of(joints.get()), 0});
+  model.structure.path.push_back({"press", copy_of(model.structure.load.get()), 0});
+  model.structure.path.push_back({"turn", copy_of(model.structure.load.get()), 1});
+}
+
+double largest_growth(const SmallModel& model, const Equilibrium& rest)
+{
+  ModesSettings settings;
+  settings.band = 2 / (2 * M_PI);
+  double growth = -1;
+  for (const ComplexMode& mode : test::modes_of(model, rest, settings, {}).modes)
+    if (mode.lambda.imag() > .5) growth = std::max(growth, mode.lambda.real());
+  return growth;
+}
+
+/// The growth of a small motion in time, over periods 20 to 35 of about its own.
+double growth_in_time(const SmallModel& model, const Equilibrium& rest, double kick)
+{
+  constexpr int steps = 200;
+  const double T = 2 * M_PI / 1.06;
+  const ThetaStep step = make_theta_step(model.structure, model.interface, T / steps, 0.5, {});
+  State state{copy_of(rest.u.get()), test::vector_like(model.structure.K, {kick, 0, 0, 0, 0, 0, 0, 0, 0}), 0,
+              rest.reactions};
+  StepWork work = begin_steps(step, model.structure, model.interface, state);
+  std::vector<double> amplitude;
+  for (int period = 0; period < 35; ++period)
+  {
+    std::vector<double> x;
+    for (int i = 0; i < steps; ++i)
+    {
+      (void)advance(step, model.structure, model.interface, work, state);
+      x.push_back(all_entries(state.u)[0]);
+    }
+    const auto [low, high] = std::ranges::minmax(x);
+    amplitude.push_back(high - low);
+  }
+  return std::log(amplitude[34] / amplitude[19]) / (15 * T);
+}
+
+} // namespace
+
+TEST_CASE("a small motion about a joint that has slipped grows as with the joint stuck, whichever way it is kicked")
+{
+  SmallModel model = mounted_oscillator({.2, 6, 6}, .06);
+  turn_after_pressing(model);
+  const Equilibrium rest = find_equilibrium(model.structure, model.interface, {});
+  REQUIRE(rest.outcome.kind == OutcomeKind::converged);
+  CHECK(rest.history->slip == 1);
+  CHECK(rest.history->stick == 2);
+  const double stuck = largest_growth(model, rest);
+  CHECK(stuck == doctest::Approx(.00148).epsilon(5e-3));
+  for (const double kick : {1e-6, -1e-6})
+    CHECK(growth_in_time(model, rest, kick) == doctest::Approx(stuck).epsilon(2e-2));
+  model.interface.friction.common.slipped_pairs_stick = false;
+  CHECK(largest_growth(model, rest) < -.01); // the wrong word: along its last friction it slides one way only
+}
+
+TEST_CASE("the other sense of the drive gives the mirrored answer, and the path anew the same one")
+{
+  // a pad between two brackets: motions pad x, y, disc y, brackets x
+  const auto found_with = [](double speed)
+  {
+    SmallModel model;
+    const Rows K = test::diagonal({0, 0, 5e7, 3e7, 3e7});
+    model.structure = test::make_structure(test::diagonal({1, 1, 1, 1, 1}), test::zeros(5, 5), K, {0, -1000, 0, 0, 0});
+    model.interface = test::make_interface(
+        {{0, 1, -1, 0, 0}, {1, 0, 0, 0, 0}, {-1, 0, 0, 1, 0}, {0, 1, 0, 0, 0}, {1, 0, 0, 0, -1}, {0, 1, 0, 0, 0}}, 1,
+        {0, 1e-7, 1e-7}, {speed, 0, 0}, 0.4, model.structure.K);
+    Equilibria equilibria{EquilibriumOptions{}};
+    const Equilibrium first = equilibria.at(model.structure, model.interface),
+                      again = equilibria.at(model.structure, model.interface);
+    CHECK(first.outcome.kind == OutcomeKind::converged);
+    CHECK(first.reactions == again.reactions);
+    return first.reactions;
+  };
+  const std::vector<double> forth = found_with(1), back = found_with(-1);
+  CHECK(forth[0] == doctest::Approx(1000 / 1.16).epsilon(1e-2));
+  const std::vector<double> mirrored = {back[0], -back[1], back[4], back[5], back[2], back[3]};
+  for (std::size_t i = 0; i < forth.size(); ++i) CHECK(std::abs(forth[i] - mirrored[i]) < 1e-9 * 1000);
 }

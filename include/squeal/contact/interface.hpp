@@ -22,6 +22,7 @@ struct Interface
   std::vector<ContactPair> geometry;         // per pair; empty on a matrix scene
   std::vector<std::array<Vec3, 2>> tangents; // [-] t1 and t2 per pair; t2 is zero where there is one direction
   std::vector<double> compliance;            // [m/N] per pair, in series with it; empty: all pairs are rigid
+  std::vector<double> slip_compliance;       // [m/N] per pair, in series with its friction; empty: stick is rigid
   PairFriction friction;
 
   /// Of a contact vector.
@@ -44,6 +45,9 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
 Interface read_interface(const std::filesystem::path& folder, const Structure& structure, const FrictionLaw& friction,
                          MPI_Comm comm);
 
+/// The same contact, of the same B.
+Interface sharing(const Interface& interface);
+
 /// Throws Error for a pair that cannot move along its normal. Collective.
 void check_interface(const Interface& interface, const std::string& source, MPI_Comm comm);
 
@@ -61,6 +65,19 @@ inline double compliance_of(const Interface& interface, std::size_t pair)
 {
   return interface.compliance.empty() ? 0 : interface.compliance[pair];
 }
+
+/// Elastic slip of a pair without a drive over its friction [m/N]; 0: it sticks rigidly, or slides. Not collective.
+double slip_compliance_of(const Interface& interface, std::size_t pair);
+
+/// Whether any of the pairs has some. Not collective.
+bool has_elastic_slip(const Interface& interface);
+
+/// Compliances in series with every row [m/N], normal and of elastic slip; empty: none has any. Not collective.
+std::vector<double> compliance_of_rows(const Interface& interface);
+
+/// Where friction holds pairs with elastic slip: B_t u + c_t r_t [m], in the tangential rows of a contact vector.
+/// Collective.
+std::vector<double> slip_positions(const Interface& interface, Vec u, const std::vector<double>& reactions);
 
 /// |v_d| of a pair [m/s]. Not collective.
 double drive_speed(const Interface& interface, std::size_t pair);

@@ -34,7 +34,10 @@ inline double length(double x, double y)
 /// At a sliding speed [m/s].
 inline FrictionCoefficient friction_coefficient(const FrictionLaw& law, double speed)
 {
-  if (law.decay_speed == 0) return {law.coefficient, 0};
+  if (!depends_on_speed(law)) return {law.coefficient, 0};
+  if (law.decay_speed == 0)
+    return {law.coefficient * factor_at(law.factor_at_speed, speed),
+            law.coefficient * slope_at(law.factor_at_speed, speed)};
   const double excess = (law.static_coefficient - law.coefficient) * std::exp(-speed / law.decay_speed);
   return {law.coefficient + excess, -excess / law.decay_speed};
 }
@@ -42,13 +45,22 @@ inline FrictionCoefficient friction_coefficient(const FrictionLaw& law, double s
 /// The derivative of mu(speed) in law.coefficient.
 inline double share_of_coefficient(const FrictionLaw& law, double speed)
 {
-  return law.decay_speed == 0 ? 1 : 1 - std::exp(-speed / law.decay_speed);
+  return law.decay_speed == 0 ? factor_at(law.factor_at_speed, speed) : 1 - std::exp(-speed / law.decay_speed);
 }
 
-/// The steepest fall of mu(speed) [s/m], at rest; 0 where mu does not fall.
+/// The steepest fall of mu(speed) [s/m]; 0 where mu does not fall.
 inline double steepest_fall(const FrictionLaw& law)
 {
-  return law.decay_speed == 0 ? 0 : std::max(0., law.static_coefficient - law.coefficient) / law.decay_speed;
+  double fall = 0; // at a speed that is given: of the line from there
+  for (const double speed : law.factor_at_speed.at)
+    fall = std::max(fall, -law.coefficient * slope_at(law.factor_at_speed, speed));
+  return law.decay_speed == 0 ? fall : std::max(0., law.static_coefficient - law.coefficient) / law.decay_speed;
+}
+
+/// A speed over which mu changes [m/s]; 0: it is constant.
+inline double speed_scale(const FrictionLaw& law)
+{
+  return law.decay_speed > 0 || law.factor_at_speed.at.empty() ? law.decay_speed : law.factor_at_speed.at.back();
 }
 
 /// The steepest fall of all of them.
@@ -62,7 +74,12 @@ inline double steepest_fall(const PairFriction& friction)
 /// The laws as functions of |w_t| where the sliding speed is `part` |w_t|.
 inline PairFriction law_of_step(const PairFriction& friction, double part)
 {
-  return changed(friction, [part](FrictionLaw& law) { law.decay_speed /= part; });
+  return changed(friction,
+                 [part](FrictionLaw& law)
+                 {
+                   law.decay_speed /= part;
+                   for (double& speed : law.factor_at_speed.at) speed /= part;
+                 });
 }
 
 /// mu at the sliding speed of w.
@@ -148,8 +165,8 @@ enum class ContactStatus : char
 };
 
 /// A closed pair sticks where its friction stays inside the Coulomb disc of rest by more than 1e-8 of the largest
-/// normal reaction of all pairs. Where mu depends on the speed, friction of slip may be inside that disc too. A pair
-/// then sticks only if its sliding speed w_t is below 1e-5 of the law's decay speed.
+/// normal reaction of its contact. Where mu depends on the speed, friction of slip may be inside that disc too. A pair
+/// then sticks only if its sliding speed w_t is below 1e-5 of the speed over which the law changes.
 ContactStatus contact_status(const PairVector& r, const PairVector& w, const FrictionLaw& law, double largest);
 
 /// `w`: contact velocities, which are read where mu depends on the speed; may be empty elsewhere.

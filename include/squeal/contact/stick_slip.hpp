@@ -5,10 +5,13 @@
 ///     0 <= w_n _|_ r_n >= 0;   undriven: |r_t| <= mu r_n, r_t = -mu r_n w_t/|w_t| where w_t is not 0;
 ///     driven: r_t = mu r_n e.
 /// Semismooth Newton on the statuses. A status leaves each pair as many unknowns as it has rows, and a linear system.
+/// Where M can be divided by, r = M^-1 N w - M^-1 q: pairs that stick have w = 0 and leave the system, which a joint of
+/// thousands that mostly stick would fill.
 /// The step in time has the same law with velocities for displacements. Arithmetic of one rank.
 #include "squeal/contact/pair_law.hpp"
 
 #include <Eigen/LU>
+#include <optional>
 
 namespace squeal
 {
@@ -16,16 +19,32 @@ namespace squeal
 /// The matrices that increments share.
 struct StickSlipOperator
 {
-  Eigen::MatrixXd N, M; // rows x rows
+  Eigen::MatrixXd N, M; // rows x rows; M empty: identity
   int directions = 1;
   std::vector<NaturalScale> rho; // [N/m] of each pair, by its own block of M
   double compliance = 0;         // [m/N] the largest diagonal entry of M
   std::vector<int> contact;      // number of each pair's: reactions are judged by the largest of their contact
+
+  /// The size of a right-hand side as a motion [m].
+  double motion(const Eigen::VectorXd& q) const
+  {
+    return (M.size() > 0 ? 1 : compliance) * q.lpNorm<Eigen::Infinity>();
+  }
 };
 
 /// `contact`: as above.
 StickSlipOperator make_stick_slip_operator(Eigen::MatrixXd N, Eigen::MatrixXd M, int directions,
                                            std::vector<int> contact);
+
+/// The same law with N and q divided by M.
+struct DividedOperator
+{
+  StickSlipOperator of;
+  Eigen::PartialPivLU<Eigen::MatrixXd> by; // M
+};
+
+/// Nothing where rows of M depend on each other. Takes `of`, or leaves it as it is.
+std::optional<DividedOperator> divided(StickSlipOperator& of);
 
 /// The friction of the pairs in one increment.
 struct StickSlipFriction
@@ -66,11 +85,14 @@ private:
   };
   PairSystem system_of(std::size_t pair, const StickSlipFriction& friction, const StickSlipState& at);
   void close(PairSystem& system, std::size_t pair, const StickSlipFriction& friction, const StickSlipState& at);
+  Eigen::VectorXd solution(const Eigen::VectorXd& rhs) const; // of the system
   StickSlipState spread(const Eigen::VectorXd& y) const;
 
   const StickSlipOperator& of_;
   std::vector<PairSystem> pairs_;
   std::vector<ContactStatus> statuses_;
+  std::vector<std::size_t> unknown_; // pairs of the system
+  std::vector<Eigen::Index> rows_;   // theirs
   Eigen::MatrixXd matrix_;
   Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
   StickSlipState particular_; // y = 0

@@ -56,7 +56,7 @@ Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>&
                             const std::vector<double>& reactions, FrictionDamping part);
 
 /// The stiffness of the closed pairs with a compliance c: sum B_n' B_n/c, or with the friction that follows the normal
-/// reactions, sum R' B_n/c. Null without such pairs.
+/// reactions, sum R' B_n/c; and sum B_t' B_t/c_t of those that stick with elastic slip. Null without such pairs.
 enum class PairForces
 {
   normal,

@@ -15,6 +15,7 @@ struct State
   Owned<Vec> u, v;               // [m, m/s]
   double time = 0;               // [s]
   std::vector<double> reactions; // [N] of the last step (impulse / h); warm start of the next; empty: none known
+  std::vector<double> slip{};    // [m] slip_positions; empty: those of u with the reactions
 };
 
 /// A deep copy.
@@ -24,11 +25,12 @@ State copy_of(const State& state);
 double kinetic_energy(const Structure& structure, Vec v);   // v'Mv/2 [J]
 double potential_energy(const Structure& structure, Vec u); // u'Ku/2 [J]
 
-/// Vec u, then Vec v, PETSc binary, in the order of files (file_order.hpp). Collective; the file is whole or absent.
+/// Vec u, then Vec v, PETSc binary, in the order of files (file_order.hpp), then the slip positions where there are
+/// some. Collective; the file is whole or absent.
 void write_state(const State& state, const Structure& structure, const std::filesystem::path& file);
 
-/// Error: the file is missing, is not two PETSc vectors, or is cut short. Error, too: it has another size than the
-/// structure, or holds an entry that is not finite.
+/// Error: the file is missing, does not begin with two PETSc vectors, or is cut short. Error, too: it has another size
+/// than the structure, or holds an entry that is not finite.
 State read_state(const std::filesystem::path& file, const Structure& structure);
 
 } // namespace squeal

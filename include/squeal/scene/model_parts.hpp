@@ -140,15 +140,37 @@ struct Pressure
   double value = 0; // [Pa] positive towards the solid
 };
 
+/// A factor along time or speed: straight lines between the given values, constant before the first and after the
+/// last. Without values it is 1.
+struct FactorTable
+{
+  std::vector<double> at;    // [s] or [m/s], rising
+  std::vector<double> value; // [-] one a place
+};
+
+/// The factor at a place.
+double factor_at(const FactorTable& factor, double place);
+
+/// The slope of the line that the factor is on; 0 where it is constant.
+double slope_at(const FactorTable& factor, double place);
+
 /// Coulomb's law with mu(s) = coefficient + (static_coefficient - coefficient) exp(-s/decay_speed) at the sliding speed
-/// s.
+/// s, or coefficient times a factor of s.
 struct FrictionLaw
 {
-  double coefficient = 0;        // [-]
-  bool direction_damping = true; // keep mu r_n/|v_d| (I - e e') in the modes (src/README.md, section 3.3)
-  double static_coefficient = 0; // [-] mu at rest; of no meaning without a decay_speed
-  double decay_speed = 0;        // [m/s] 0: mu is `coefficient` at every speed
+  double coefficient = 0;          // [-]
+  bool direction_damping = true;   // keep mu r_n/|v_d| (I - e e') in the modes (src/README.md, section 3.3)
+  double static_coefficient = 0;   // [-] mu at rest; of no meaning without a decay_speed
+  double decay_speed = 0;          // [m/s] 0: no such decay
+  FactorTable factor_at_speed{};   // [m/s] on the coefficient
+  bool slipped_pairs_stick = true; // in modes, of pairs without a drive that slipped on the load path
 };
+
+/// Whether mu changes with the sliding speed.
+inline bool depends_on_speed(const FrictionLaw& law)
+{
+  return law.decay_speed > 0 || !law.factor_at_speed.at.empty();
+}
 
 /// The side of a contact whose nodes have the pairs.
 enum class SlaveSide
@@ -164,16 +186,17 @@ template <> inline constexpr std::array words_of<SlaveSide> = {"stator", "rotor"
 /// - v_d (src/README.md, section 1.2).
 struct Contact
 {
-  std::string rotor;                     // surface or point that the drive moves
-  std::string stator;                    // surface or point that slides on it
-  double gap = 0;                        // [m] initial gap, positive if open
-  std::optional<Vec3> normal;            // [-] unit, out of the rotor; required for points, else the slave surface's
-  std::vector<Vec3> tangents;            // [-] one: plane friction along it; two; empty: two chosen from the normal
-  std::optional<Rotation> rotation;      // of the rotor: v_d is the tangential part of rate axis x (x - centre)
-  Vec3 velocity{};                       // [m/s] of the rotor's surface if there is no rotation
-  double reach = 0;                      // [m] largest distance of the surfaces along the normal
-  SlaveSide slave{};                     // has one pair a node
-  double compliance = 0;                 // [m3/N] approach over pressure, in series with the pairs; [m/N] of points
+  std::string rotor;                // surface or point that the drive moves
+  std::string stator;               // surface or point that slides on it
+  double gap = 0;                   // [m] initial gap, positive if open
+  std::optional<Vec3> normal;       // [-] unit, out of the rotor; required for points, else the slave surface's
+  std::vector<Vec3> tangents;       // [-] one: plane friction along it; two; empty: two chosen from the normal
+  std::optional<Rotation> rotation; // of the rotor: v_d is the tangential part of rate axis x (x - centre)
+  Vec3 velocity{};                  // [m/s] of the rotor's surface if there is no rotation
+  double reach = 0;                 // [m] largest distance of the surfaces along the normal
+  SlaveSide slave{};                // has one pair a node
+  double compliance = 0;            // [m3/N] approach over pressure, in series with the pairs; [m/N] of points
+  double slip_compliance = 0;       // [m3/N] elastic slip over shear stress, in series with friction without a drive
   std::optional<FrictionLaw> friction{}; // if absent, the scene's
 };
 

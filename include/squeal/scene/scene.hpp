@@ -101,23 +101,12 @@ struct EstimateSettings
   bool enabled = true;
 };
 
-/// A factor that depends on time: straight lines between the given values, constant before the first and after the
-/// last. Without values it is 1.
-struct TimeFactor
-{
-  std::vector<double> time;  // [s] rising
-  std::vector<double> value; // [-] one a time
-};
-
-/// The factor at a time [s].
-double factor_at(const TimeFactor& factor, double time);
-
 /// Factors on what acts on the structure, over the time of a transient.
 struct Ramps
 {
-  TimeFactor load;     // on all forces and pressures
-  TimeFactor speed;    // on all drive velocities
-  TimeFactor friction; // on the coefficients of friction
+  FactorTable load;     // on all forces and pressures
+  FactorTable speed;    // on all drive velocities
+  FactorTable friction; // on the coefficients of friction
 };
 
 /// Whether any of them is given.
