@@ -148,11 +148,11 @@ struct EndOfPath
 
 /// On rank 0.
 void walk_to_end(const PathOperators& operators, const Interface& interface, const std::vector<PathEnd>& ends,
-                 EndOfPath& end)
+                 const std::optional<StickSlipState>& from, EndOfPath& end)
 {
   end.of = operator_of(operators, interface);
   const PathProblem problem{end.of, operators.held.kappa, interface.gap, friction_of(interface), ends};
-  const PathWalk walk = walk_path(problem);
+  const PathWalk walk = from ? hold_at(problem, *from) : walk_path(problem);
   end.friction = walk.friction;
   Found& found = end.found;
   found.completed = walk.completed;
@@ -164,7 +164,7 @@ void walk_to_end(const PathOperators& operators, const Interface& interface, con
   found.offset = as_list(walk.offset);
   if (!walk.completed)
   {
-    found.reason = mechanism(problem, walk, interface);
+    found.reason = from ? walk.reason : mechanism(problem, walk, interface);
     return;
   }
   end.system.emplace(end.of, end.friction, walk.state);
@@ -261,12 +261,13 @@ PathOperators path_operators(const Structure& structure, const Interface& interf
   return operators;
 }
 
-Equilibrium find_by_path(const PathOperators& operators, const Structure& structure, const Interface& interface)
+Equilibrium find_by_path(const PathOperators& operators, const Structure& structure, const Interface& interface,
+                         const std::optional<StickSlipState>& from)
 {
   const MPI_Comm comm = comm_of(structure.load);
   const std::vector<PathEnd> ends = ends_of(operators, structure, interface);
   EndOfPath end;
-  on_rank_zero_with_lent_cores(comm, interface.size(), [&] { walk_to_end(operators, interface, ends, end); });
+  on_rank_zero_with_lent_cores(comm, interface.size(), [&] { walk_to_end(operators, interface, ends, from, end); });
   Found& found = end.found;
   share(found, comm);
   Equilibrium equilibrium;

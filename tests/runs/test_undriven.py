@@ -96,7 +96,6 @@ def test_a_start_in_motion_is_given_by_keys(scene, converged):
 
 def test_what_does_not_know_such_contacts_says_so(scene, squeal):
     wrong = {
-        "[cycle] does not know": "[cycle]\n",
         "is the last one": step("press", load=0.5),
         "holds 2 factors": step("press", forces=[1, 1]),
         "moves nothing": '[transient]\n[[initial]]\non = "pad"\n',
