@@ -114,7 +114,6 @@ void refuse_undriven_pairs(const Scene& scene, const Interface& interface)
       throw Error(scene.file.string() + ": " + stage + " does not know pairs without a drive yet, and " + contact +
                   " has some: " + remedy + ", or give the contact a velocity, or friction = 0");
   };
-  refuse(scene.cycle.enabled, "[cycle]", "set cycle.enabled = false");
   refuse(scene.modes.reduced_matrices, "[modes] reduced_matrices", "set it to false");
   refuse(scene.sweep && scene.sweep->stages != SweepStages::equilibrium, "[sweep] of modes or cycles",
          "set sweep.stages = \"equilibrium\"");

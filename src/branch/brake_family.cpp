@@ -138,6 +138,12 @@ FlowFamily BrakeFamily::flows()
   family.flow.record_period = [this](double period, Vec start, const TimeGrid& grid)
   { at_->flow.record_period(period, start, grid); };
   family.flow.apply_tangent = [this](std::span<const Vec> states) { at_->flow.apply_tangent(states); };
+  if (at_->flow.offsets.motion)
+  {
+    family.flow.offsets.motion = [this] { return at_->flow.offsets.motion(); };
+    family.flow.offsets.find_rest = [this](Vec rest) { at_->flow.offsets.find_rest(rest); };
+    family.flow.offsets.without_held = [this](Vec part) { at_->flow.offsets.without_held(part); };
+  }
   family.set_parameter = [this](double parameter) { set_parameter(parameter); };
   family.rest = [this] { return rest(); };
   family.parameter_column = [this](double period, Vec start, Vec column) { parameter_column(period, start, column); };

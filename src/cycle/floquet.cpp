@@ -54,7 +54,7 @@ std::vector<PairHistory> histories(const Interface& interface, std::span<const s
   return pairs;
 }
 
-/// Pairs whose status changes are active, those that always slide are eliminated.
+/// Pairs whose status changes are active, those that always slide, or stick without a drive, are eliminated.
 PairRoles roles_of(const std::vector<PairHistory>& pairs, const Interface& interface, std::size_t steps)
 {
   PairRoles roles{{}, std::vector<char>(pairs.size(), 0), std::vector<double>(interface.size(), 0.)};
@@ -63,7 +63,8 @@ PairRoles roles_of(const std::vector<PairHistory>& pairs, const Interface& inter
   {
     reactions.normal(i) = pairs[i].reaction / static_cast<double>(steps);
     if (!pairs[i].closed) continue;
-    if (pairs[i].opened || pairs[i].stuck || pairs[i].turned)
+    const bool changes = is_undriven(interface, i) ? pairs[i].turned : pairs[i].stuck || pairs[i].turned;
+    if (pairs[i].opened || changes)
       roles.active.push_back(static_cast<int>(i));
     else
       roles.sliding[i] = 1;
@@ -184,12 +185,15 @@ RealModes modes_beyond_band(const CycleProblem& problem)
   return real_modes_beyond(problem, far * frequency);
 }
 
-/// The number of pairs that slide throughout.
-int eliminated_pairs(const CycleProblem& problem, const RecordedPeriods& periods)
+/// The number of motions that pairs which slide, or stick without a drive, throughout take away.
+int eliminated_motions(const CycleProblem& problem, const RecordedPeriods& periods)
 {
   const Interface& interface = problem.sliding.interface;
   const PairRoles roles = roles_of(histories(interface, periods.records), interface, 1);
-  return static_cast<int>(std::count(roles.sliding.begin(), roles.sliding.end(), 1));
+  int motions = 0;
+  for (std::size_t i = 0; i < roles.sliding.size(); ++i)
+    motions += roles.sliding[i] ? 1 + (is_undriven(interface, i) ? interface.directions : 0) : 0;
+  return motions;
 }
 
 /// Why a model of so many shapes is not made; empty: it takes no more than `part` of the free memory.
@@ -214,8 +218,12 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   std::size_t steps = 0;
   for (const auto& records : periods.records) steps += records.size();
   const PairRoles roles = roles_of(pairs, interface, steps);
-  const bool slide =
-      std::none_of(pairs.begin(), pairs.end(), [](const PairHistory& pair) { return pair.stuck || pair.turned; });
+  const bool slide = std::ranges::none_of(roles.active,
+                                          [&](int pair)
+                                          {
+                                            const PairHistory& history = pairs[static_cast<std::size_t>(pair)];
+                                            return history.stuck || history.turned;
+                                          });
   const std::size_t rows = PairRows<std::size_t>(interface.directions).rows_of(roles.active.size());
   const bool follow = slide && rows > 150; // friction, the normal force
   const RealModes beyond = modes_beyond_band(problem);
@@ -298,7 +306,7 @@ SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, int 
   slow.periods = none.periods;
   set_grid_errors(spectrum, own, other_steps, period, contacts, slow);
   slow.others = slow_sliding_motions(problem.modes, start);
-  const bool whole = holds_every_motion(*model, eliminated_pairs(problem, periods), start);
+  const bool whole = holds_every_motion(*model, eliminated_motions(problem, periods), start);
   slow.confirmed = [=, steps = map.steps, theta = map.theta, recorded = std::move(recorded), values = spectrum.values]
   {
     const ReducedMap along{*model, steps, theta, comm};

@@ -45,17 +45,29 @@ MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double
   set_period(map, period);
   const std::int64_t samples = recording.samples; // done * samples may not fit an int
   int done = 0;
+  JointUseMeter joints;
+  std::span<StepRecord> records; // what joints do is known from the steps' contact
+  if (has_undriven_pairs(map.sliding.interface))
+  {
+    map.records.clear();
+    map.records.resize(static_cast<std::size_t>(map.steps));
+    map.recorded_start = {};
+    records = map.records;
+  }
   const auto watch = [&](const State& now, const StepReport&, const StepWork&)
   {
     measured.statuses.push_back(contact_status(map.sliding.interface, now.reactions, now.v));
+    if (!records.empty()) joints.add_step(map.sliding.interface, now.reactions, measured.statuses.back());
     // evenly spread over the period whatever the two numbers
     if ((done + 1) * samples / map.steps > done * samples / map.steps) measured.displacements.push_back(copy_of(now.u));
     if (++done + 1 == map.steps && rate) keep_for_rate(now);
   };
-  const MarchSummary summary =
-      march(map.step, map.sliding, map.steps, measured.end, {recording.probes, measured.history, watch});
+  const MarchSummary summary = march(map.step, map.rest.about(map.sliding), map.steps, measured.end,
+                                     {recording.probes, measured.history, watch, records});
   if (summary.interrupted) throw Interrupted{};
   map.unconverged += summary.unconverged;
+  measured.joints = joints.result();
+  note_joints(map, start);
   if (rate)
   {
     State after = copy_of(measured.end);

@@ -125,6 +125,7 @@ void integrate_once(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
   check(VecCopy(state.u, displacement(end)));
   check(VecCopy(state.v, velocity(end)));
   if (!rate) return;
+  note_joints(map, start);
   complete_rate(map, work, state, rate);
   if (map.keeps_step) end_at_period(map, period, start, end, rate, state.v);
 }
@@ -153,6 +154,15 @@ void move_by_part(const PeriodMap& map, double part, State& state)
   check(VecAXPY(state.u, -h * s * s * (1 - s), next.v));
   check(VecAXPBY(state.v, s, 1 - s, next.v));
   state.reactions = next.reactions;
+}
+
+void note_joints(PeriodMap& map, Vec start)
+{
+  const Interface& interface = map.sliding.interface;
+  if (!has_undriven_pairs(interface)) return;
+  const std::vector<std::vector<double>> motion = relative(interface, std::array{displacement(start), velocity(start)});
+  map.joints = joint_motion(interface, map.step, map.records, motion[0], motion[1]);
+  map.rest.follow(map.sliding, map.options.factor, map.joints);
 }
 
 void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& grid)
@@ -191,6 +201,12 @@ void add_tangent(PeriodMap& map, Flow& flow)
   flow.record_period = [&map](double period, Vec start, const TimeGrid& grid)
   { record_period(map, period, start, grid); };
   flow.apply_tangent = [&map](std::span<const Vec> states) { apply_tangent(map, states); };
+  if (!has_undriven_pairs(map.sliding.interface)) return;
+  flow.offsets.motion = [&map] { return map.joints.slip; };
+  flow.offsets.find_rest = [&map](Vec rest)
+  { check(VecCopy(map.rest.about(map.sliding).equilibrium.u, displacement(rest))); };
+  flow.offsets.without_held = [&map](Vec part)
+  { take_out_tangents(map.sliding.interface, held_pairs(map.sliding.interface, map.records), part); };
 }
 
 Flow flow_of(PeriodMap& map)

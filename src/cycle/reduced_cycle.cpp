@@ -79,9 +79,11 @@ void build_model(ReducedSearch& search, double amplitude)
   const double clock = MPI_Wtime();
   const CycleProblem& problem = search.problem;
   // where its cycle is the answer, friction is left free
-  const bool sliding =
-      search.fidelity.asked != CycleModel::reduced &&
-      pairs_that_may_turn(problem.sliding.interface, problem.unstable.modes.front(), amplitude).empty();
+  const Interface& interface = problem.sliding.interface;
+  const bool with_joints = std::ranges::any_of(search.active, [&](int pair)
+                                               { return is_undriven(interface, static_cast<std::size_t>(pair)); });
+  const bool sliding = search.fidelity.asked != CycleModel::reduced && !with_joints &&
+                       pairs_that_may_turn(interface, problem.unstable.modes.front(), amplitude).empty();
   {
     const ReducedModel released = std::move(search.model); // before the next one takes memory
   }
@@ -327,8 +329,11 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
   { return coordinates(search.model, problem.sliding.structure, displacement(x), velocity(x)); };
   for (;;)
   {
-    search.active =
-        pairs_that_may_change(problem.sliding.interface, problem.sliding.equilibrium, mode, margin * amplitude);
+    const std::vector<int> change = pairs_that_may_change(problem.sliding.interface, problem.sliding.equilibrium, mode,
+                                                          margin * amplitude),
+                           slip = pairs_that_may_slip(problem.sliding, problem.linearised, mode, margin * amplitude);
+    search.active.clear();
+    std::ranges::set_union(change, slip, std::back_inserter(search.active));
     if (const std::string refusal = size_refusal(search); !refusal.empty()) return refusal;
     build_model(search, margin * amplitude);
     free.state = on_model(motion);

@@ -370,7 +370,7 @@ Equilibrium Equilibria::at(const Structure& structure, const Interface& interfac
     equilibrium.outcome = {OutcomeKind::converged, "", 0, 0};
     return equilibrium;
   }
-  if (has_undriven_pairs(interface)) return at_end_of_path(structure, interface);
+  if (has_undriven_pairs(interface)) return find_by_path(operators_for(structure, interface), structure, interface, {});
   if (!kept_ || !kept_->serves(structure, interface))
   {
     kept_.reset(); // before the next is made: both may be large
@@ -382,7 +382,19 @@ Equilibrium Equilibria::at(const Structure& structure, const Interface& interfac
   return equilibrium;
 }
 
-Equilibrium Equilibria::at_end_of_path(const Structure& structure, const Interface& interface)
+Equilibrium Equilibria::at_offsets(const SlidingEquilibrium& path, const std::vector<double>& offsets)
+{
+  const auto& [structure, interface, equilibrium] = path;
+  const auto rows = static_cast<Eigen::Index>(interface.size());
+  StickSlipState from{Eigen::VectorXd::Map(equilibrium.reactions.data(), rows), Eigen::VectorXd::Zero(rows)};
+  const PairView<double> slips(from.w, interface.directions);
+  for (std::size_t i = 0; i < slips.pairs(); ++i)
+    for (std::size_t k = 0; is_undriven(interface, i) && k < slips.tangential(i).size(); ++k)
+      slips.tangential(i)[k] = -PairView(offsets, interface.directions).tangential(i)[k];
+  return find_by_path(operators_for(structure, interface), structure, interface, from);
+}
+
+const PathOperators& Equilibria::operators_for(const Structure& structure, const Interface& interface)
 {
   if (!path_kept_ || path_kept_->K.get() != structure.K || path_kept_->B.get() != interface.B)
   {
@@ -390,7 +402,7 @@ Equilibrium Equilibria::at_end_of_path(const Structure& structure, const Interfa
     path_kept_ = std::make_unique<PathOperators>(path_operators(structure, interface, options_));
     ++factors_;
   }
-  return find_by_path(*path_kept_, structure, interface);
+  return *path_kept_;
 }
 
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)

@@ -148,7 +148,8 @@ struct EndOfPath
 };
 
 /// On rank 0.
-void walk_to_end(const PathOperators& operators, const Interface& interface, std::vector<PathEnd> ends, EndOfPath& end)
+void walk_to_end(const PathOperators& operators, const Interface& interface, std::vector<PathEnd> ends,
+                 const std::optional<StickSlipState>& from, EndOfPath& end)
 {
   end.of = operator_of(operators, interface);
   if (std::optional<DividedOperator> stiff = divided(end.of))
@@ -158,7 +159,7 @@ void walk_to_end(const PathOperators& operators, const Interface& interface, std
   }
   for (PathEnd& step : ends) step.q = end.divided(step.q);
   const PathProblem problem{end.of, end.by ? 1 : operators.held.kappa, interface.gap, friction_of(interface), ends};
-  const PathWalk walk = walk_path(problem);
+  const PathWalk walk = from ? hold_at(problem, *from) : walk_path(problem);
   end.friction = walk.friction;
   Found& found = end.found;
   found.completed = walk.completed;
@@ -170,7 +171,7 @@ void walk_to_end(const PathOperators& operators, const Interface& interface, std
   found.offset = as_list(walk.offset);
   if (!walk.completed)
   {
-    found.reason = mechanism(problem, walk, interface);
+    found.reason = from ? walk.reason : mechanism(problem, walk, interface);
     return;
   }
   end.system.emplace(end.of, end.friction, walk.state);
@@ -264,12 +265,13 @@ PathOperators path_operators(const Structure& structure, const Interface& interf
   return operators;
 }
 
-Equilibrium find_by_path(const PathOperators& operators, const Structure& structure, const Interface& interface)
+Equilibrium find_by_path(const PathOperators& operators, const Structure& structure, const Interface& interface,
+                         const std::optional<StickSlipState>& from)
 {
   const MPI_Comm comm = comm_of(structure.load);
   const std::vector<PathEnd> ends = ends_of(operators, structure, interface);
   EndOfPath end;
-  on_rank_zero_with_lent_cores(comm, interface.size(), [&] { walk_to_end(operators, interface, ends, end); });
+  on_rank_zero_with_lent_cores(comm, interface.size(), [&] { walk_to_end(operators, interface, ends, from, end); });
   Found& found = end.found;
   share(found, comm);
   Equilibrium equilibrium;

@@ -4,6 +4,8 @@
 #include "squeal/equilibrium/equilibrium.hpp"
 #include "squeal/equilibrium/path_walk.hpp"
 
+#include <optional>
+
 namespace squeal
 {
 
@@ -18,7 +20,9 @@ struct PathOperators
 /// Error: as of hold_by_all_rows. Collective.
 PathOperators path_operators(const Structure& structure, const Interface& interface, const EquilibriumOptions& options);
 
-/// Walks along the structure's path to its load. Collective.
-Equilibrium find_by_path(const PathOperators& operators, const Structure& structure, const Interface& interface);
+/// Walks along the structure's path to its load; where a state is given, by one increment from there, reactions and
+/// minus the offsets of undriven pairs. Collective.
+Equilibrium find_by_path(const PathOperators& operators, const Structure& structure, const Interface& interface,
+                         const std::optional<StickSlipState>& from);
 
 } // namespace squeal

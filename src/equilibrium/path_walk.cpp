@@ -183,6 +183,17 @@ std::string end_of(const PathProblem& problem, const PathWalk& walk)
 
 } // namespace
 
+PathWalk hold_at(const PathProblem& problem, const StickSlipState& from)
+{
+  PathWalk walk = unloaded(problem);
+  walk.state.r = from.r;
+  walk.state.w.setZero();
+  walk.offset += from.w;
+  walk.completed = advance_to(problem, {problem.ends.size() - 1, 1}, walk);
+  if (!walk.completed) walk.reason = "there is no rest with the undriven pairs where they are";
+  return walk;
+}
+
 PathWalk walk_path(const PathProblem& problem)
 {
   PathWalk walk = walk_in_parts(problem, 1);

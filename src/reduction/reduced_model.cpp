@@ -38,43 +38,6 @@ MatrixXd normal_rows(const MatrixXd& of_pairs, int directions)
   return result;
 }
 
-} // namespace
-
-std::vector<int> pairs_that_may_change(const Interface& interface, const Equilibrium& equilibrium,
-                                       const ComplexMode& mode, double amplitude)
-{
-  const std::vector<double> real = relative(interface, mode.real), imaginary = relative(interface, mode.imaginary);
-  const std::vector<double> still = relative(interface, equilibrium.u);
-  const auto normal = [&](const std::vector<double>& x, std::size_t pair)
-  { return PairView(x, interface.directions).normal(pair); };
-  std::vector<int> pairs;
-  for (std::size_t i = 0; i < interface.gap.size(); ++i)
-  {
-    const double gap = interface.gap[i] + normal(still, i);
-    const bool changes = equilibrium.closed[i]
-                             ? normal(equilibrium.reactions, i) < amplitude * std::abs(mode.reactions[i])
-                             : gap < amplitude * std::hypot(normal(real, i), normal(imaginary, i));
-    if (changes) pairs.push_back(static_cast<int>(i));
-  }
-  return pairs;
-}
-
-std::vector<int> pairs_that_may_turn(const Interface& interface, const ComplexMode& mode, double amplitude)
-{
-  const std::vector<double> real = relative(interface, mode.real), imaginary = relative(interface, mode.imaginary);
-  std::vector<int> pairs;
-  for (std::size_t i = 0; i < interface.gap.size(); ++i)
-  {
-    const double moves = std::hypot(length(PairView(real, interface.directions).tangential(i)),
-                                    length(PairView(imaginary, interface.directions).tangential(i)));
-    if (amplitude * std::abs(mode.lambda) * moves >= drive_speed(interface, i)) pairs.push_back(static_cast<int>(i));
-  }
-  return pairs;
-}
-
-namespace
-{
-
 /// Law, gaps, reactions and drive of the active pairs; normal ones alone if they slide along the drive throughout.
 void set_active_pairs(ReducedModel& model, const Interface& interface, const Equilibrium& equilibrium, bool sliding)
 {

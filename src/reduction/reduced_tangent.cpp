@@ -7,7 +7,9 @@
 #include "squeal/base/error.hpp"
 #include "squeal/contact/sliding_direction.hpp"
 
+#include <algorithm>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <ranges>
 
 namespace squeal
@@ -227,6 +229,26 @@ through_period(ReducedMap& map, double period, const Contacts& contacts, const M
   return result;
 }
 
+/// Tangential rows of the undriven pairs that stick in every step.
+std::vector<Index> rows_held(const ReducedModel& model, std::span<const RecordedContact> contacts)
+{
+  const int directions = model.directions;
+  std::vector<char> held(directions > 0 ? model.active.size() : 0);
+  for (std::size_t i = 0; i < held.size(); ++i) held[i] = length(TangentView(model.drive, directions).of(i)) == 0;
+  if (std::ranges::count(held, 1) == 0) return {};
+  for (const RecordedContact& contact : contacts)
+  {
+    const std::vector<ContactStatus> status = contact_status(
+        PairView<const double>(contact.r, directions), PairView<const double>(contact.w, directions), model.friction);
+    for (std::size_t i = 0; i < held.size(); ++i) held[i] = held[i] && status[i] == ContactStatus::stick;
+  }
+  std::vector<Index> rows;
+  for (std::size_t i = 0; i < held.size(); ++i)
+    for (Index k = 0; held[i] && k < directions; ++k)
+      rows.push_back(PairRows<Index>(directions).tangential(static_cast<Index>(i)) + k);
+  return rows;
+}
+
 } // namespace
 
 std::vector<RecordedContact> record_contacts(ReducedMap& map, double period, ReducedState state)
@@ -288,6 +310,13 @@ MatrixXd monodromy(ReducedMap& map, double period, std::span<const RecordedConta
   MatrixXd columns = MatrixXd::Zero(2 * n, 2 * slow);
   columns.topLeftCorner(slow, slow).diagonal().setOnes();
   columns.block(n, slow, slow, slow).diagonal().setOnes();
+  const MatrixXd held = map.model.G(rows_held(map.model, contacts), Eigen::all);
+  if (held.rows() > 0) // each row has a multiplier 1: columns begin with none of it
+  {
+    const Eigen::CompleteOrthogonalDecomposition<MatrixXd> rows(held);
+    columns.topLeftCorner(n, slow) -= rows.solve(held.leftCols(slow));
+    columns.bottomRightCorner(n, slow) = columns.topLeftCorner(n, slow);
+  }
   return apply_tangent(map, period, contacts, columns);
 }
 

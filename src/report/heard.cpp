@@ -72,7 +72,8 @@ std::string stability_text(const Multipliers& multipliers)
   switch (multipliers.stability)
   {
   case Stability::stable:
-    return ", stable" + largest;
+    return ", stable" + largest +
+           (multipliers.offsets > 0 ? format(", %d offsets of joints held", multipliers.offsets) : "");
   case Stability::unstable:
     return ", which repels" + largest;
   default:

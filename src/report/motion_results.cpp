@@ -80,6 +80,9 @@ void add_verdict(Entry out, const Multipliers& multipliers)
   out.add("trivial_error", "-", "distance from 1 of the multiplier of a shift in time", multipliers.trivial_error);
   out.add("periods_integrated", "-", "columns of the tangent, beside the periods of the cycle", multipliers.periods);
   add_multipliers(out, "values", multipliers);
+  if (out.has(multipliers.offsets > 0))
+    out.show("offsets_held", "-", "offsets of joints that stay as they are, each a multiplier 1 that is left out",
+             multipliers.offsets);
   if (out.has(multipliers.crossing != Crossing::none))
     out.show("crossing", "way in which the largest multiplier of an unstable cycle is out", multipliers.crossing);
   out.text("refusal", "why Arnoldi took the place of the oblique projection", multipliers.refusal);
@@ -96,6 +99,28 @@ void add_iteration(Entry out, const NewtonRecord& record)
   out.add("residual_full", "-", "residual in the full space", record.residual_full);
 }
 
+void add_spread(Entry out, const OffsetSpread& spread)
+{
+  out.add("contact", "-", "number of a contact whose held pairs are moved all alike, from 0", spread.contact);
+  out.add("direction", "-", "along which of their tangents, from 0", spread.direction);
+  out.add("least", "m", "least offset from that of the cycle, where the first pair would slip", spread.least);
+  out.add("greatest", "m", "greatest one", spread.greatest);
+  out.add("period_by_offset", "s/m", "change of the period by the offset", spread.by_period);
+  out.add("energy_by_offset", "J/m", "change of the mean fluctuating energy by it", spread.by_energy);
+}
+
+void add_joints(Entry out, const LimitCycle& cycle)
+{
+  const JointUse& joints = cycle.measured.joints;
+  const std::vector<double>& work = cycle.measured.history.joint_work;
+  out.show("held", "-", "pairs without a drive that stick in every step: each keeps its offset", joints.held);
+  out.show("slipping", "-", "those that slip or open in some", joints.slipping);
+  out.show("largest_use", "-", "largest friction of one over its limit", joints.largest);
+  out.show("at_edge", "-", "pairs that stick throughout, with a use within 1e-3 of 1", joints.at_edge);
+  out.add("work", "J", "their work in a period, of each contact, below zero: what they take", work);
+  if (out.has(!cycle.spreads.empty())) out.list("offsets", add_spread, cycle.spreads);
+}
+
 /// Figures of the cycle, which would mislead where none was found.
 void add_figures(Entry out, const LimitCycle& cycle, const StepBias& bias)
 {
@@ -110,6 +135,8 @@ void add_figures(Entry out, const LimitCycle& cycle, const StepBias& bias)
   out.show("open_pairs_max", "-", "largest number of open pairs", measured.open_pairs_max);
   out.show("stick_pairs_max", "-", "largest number of sticking pairs", measured.stick_pairs_max);
   add_probes(out, "peak_to_peak", "swing of the probe", measured.peak_to_peak);
+  const JointUse& joints = measured.joints;
+  if (out.has(joints.held + joints.slipping > 0)) add_joints(out.group("joints"), cycle);
 }
 
 void warn_of_cycle(Entry out, const Report& report, const StepBias& bias)

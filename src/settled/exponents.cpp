@@ -65,6 +65,12 @@ TangentBundle make_bundle(const Flow& flow, Vec like, PetscInt count)
 void follow_period(const Flow& flow, TangentBundle& bundle)
 {
   flow.apply_tangent(std::vector<Vec>(bundle.columns.begin(), bundle.columns.end()));
+  if (flow.offsets.without_held) // each held one has an exponent zero
+    for (const Owned<Vec>& column : bundle.columns)
+    {
+      flow.offsets.without_held(displacement(column));
+      flow.offsets.without_held(velocity(column));
+    }
   const std::vector<double> lengths = orthonormalise(flow, bundle.columns);
   for (std::size_t k = 0; k < lengths.size(); ++k) bundle.growth[k].push_back(std::log(lengths[k]));
 }

@@ -79,10 +79,11 @@ PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, PetscIn
       add_sample(motion.shapes, map.sliding.structure.M, at.v, work.Mv, shapes);
   };
   const MarchSummary summary =
-      march(map.step, map.sliding, map.steps, now, {probe_rows, history, keep_sample, map.records});
+      march(map.step, map.rest.about(map.sliding), map.steps, now, {probe_rows, history, keep_sample, map.records});
   if (summary.interrupted) throw Interrupted{};
   map.unconverged += summary.unconverged;
   map.reactions = now.reactions;
+  note_joints(map, state);
   check(VecCopy(now.u, displacement(state)));
   check(VecCopy(now.v, velocity(state)));
   append(history, all);

@@ -32,13 +32,16 @@ Orbit integrate_free_periods(const OrbitProblem& problem, ConvergenceLog& log, V
                              const FreeIntegration& asked)
 {
   Owned<Vec> current = copy_of(state);
-  for (int done = 0; done < asked.periods; ++done)
+  const int at_most = std::max(asked.periods, asked.at_most);
+  for (int done = 0; done < (asked.periods > 0 ? at_most : 0); ++done)
   {
     const Orbit orbit = evaluate(problem, log, current, period);
     record(log, ShootingStage::free_periods, orbit, 0, std::nan(""));
+    log.slips.push_back(orbit.offsets.slip);
     check(VecAXPY(current, 1, orbit.defect));
     // A new period costs a factorisation, so a small correction waits for the last one.
-    const bool last = done + 1 == asked.periods || return_residual(problem, orbit) <= asked.near_periodic;
+    const bool enough = done + 1 >= asked.periods || return_residual(problem, orbit) <= asked.near_periodic,
+               last = done + 1 == at_most || (enough && !slips_one_way(problem, orbit));
     const double correction = nearest_recurrence(problem, orbit);
     const bool worth_it = last || std::abs(correction) > smallest_refactored * period;
     if (worth_it && admissible_period(problem, period + correction)) period += correction;

@@ -14,6 +14,7 @@ struct FreeIntegration
 {
   int periods = 0;          // at most
   double near_periodic = 0; // return residual at which it ends before; 0: never
+  int at_most = 0;          // periods where an offset still slips one way
 };
 
 /// Free periods from the state, then the evaluation of the end with the period of the best recurrence.

@@ -1,5 +1,7 @@
 #include "squeal/shooting/multisecant.hpp"
 
+#include "free_periods.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -93,6 +95,8 @@ StageResult shoot_by_multisecant(const OrbitProblem& problem, const ShootingOpti
     Orbit next = evaluate(problem, log, moved, orbit.period + step.period);
     ++log.convergence.iterations;
     record_full(log, ShootingStage::multisecant, next);
+    if (slips_one_way(problem, next))
+      next = integrate_free_periods(problem, log, next.state, next.period, {1, 0, options.free_periods});
     if (collapsing(problem, next) || !std::isfinite(next.residual))
     {
       best.ending = StageEnding::collapsed;

@@ -7,8 +7,11 @@ namespace squeal
 
 Orbit copy_of(const Orbit& orbit)
 {
-  return {copy_of(orbit.state), orbit.period,      copy_of(orbit.defect),
-          copy_of(orbit.rate),  orbit.fluctuation, orbit.residual};
+  Orbit copy{copy_of(orbit.state), orbit.period,      copy_of(orbit.defect),
+             copy_of(orbit.rate),  orbit.fluctuation, orbit.residual};
+  if (orbit.rest.get()) copy.rest = copy_of(orbit.rest);
+  copy.offsets = orbit.offsets;
+  return copy;
 }
 
 Orbit evaluate(const OrbitProblem& problem, ConvergenceLog& log, Vec state, double period)
@@ -17,6 +20,12 @@ Orbit evaluate(const OrbitProblem& problem, ConvergenceLog& log, Vec state, doub
   problem.flow.integrate(period, orbit.state, orbit.defect, orbit.rate);
   ++log.convergence.periods;
   check(VecAXPY(orbit.defect, -1, orbit.state));
+  if (const Offsets& offsets = problem.flow.offsets; offsets.motion)
+  {
+    orbit.offsets = offsets.motion();
+    orbit.rest = copy_of(problem.equilibrium.get());
+    offsets.find_rest(orbit.rest);
+  }
   const Owned<Vec> fluctuation = fluctuation_of(problem, orbit);
   orbit.fluctuation = energy_norm(problem.flow, fluctuation);
   orbit.residual = energy_norm(problem.flow, orbit.defect) / orbit.fluctuation;
@@ -50,10 +59,17 @@ bool collapsing(const OrbitProblem& problem, const Orbit& orbit)
   return !(orbit.fluctuation > problem.least_fluctuation);
 }
 
+bool slips_one_way(const OrbitProblem& problem, const Orbit& orbit)
+{
+  constexpr double small = 1e-5;
+  const auto& [slip, swing, held] = orbit.offsets;
+  return slip > (problem.tolerance > 0 ? problem.tolerance : small) * swing;
+}
+
 Owned<Vec> fluctuation_of(const OrbitProblem& problem, const Orbit& orbit)
 {
   Owned<Vec> fluctuation = copy_of(orbit.state.get());
-  check(VecAXPY(fluctuation, -1, problem.equilibrium));
+  check(VecAXPY(fluctuation, -1, orbit.rest.get() ? orbit.rest.get() : problem.equilibrium.get()));
   return fluctuation;
 }
 

@@ -75,6 +75,7 @@ Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* kno
   const auto& [problem, options, log, start] = search;
   Orbit orbit = copy_of(free);
   const double first_return = return_residual(problem, free);
+  if (slips_one_way(problem, free)) return {{std::move(orbit), StageEnding::slips}, first_return};
   if (orbit.residual > problem.tolerance && options.subspace_newtons > 0 && !start.shapes.empty())
     orbit = shoot_on_shapes(problem, options, log, std::move(orbit), start.shapes);
   Attempt attempt{shoot_once(problem, options, log, std::move(orbit)), first_return};
@@ -134,8 +135,9 @@ Attempt search_on(const Search& search, Attempt best, int done, Orbit& free)
     }
     const double before = free.fluctuation;
     const long periods = log.convergence.periods;
-    free = integrate_free_periods(problem, log, state, period,
-                                  {static_cast<int>(std::min<long>(count, left)), last_return / 3});
+    free = integrate_free_periods(
+        problem, log, state, period,
+        {static_cast<int>(std::min<long>(count, left)), last_return / 3, static_cast<int>(left)});
     done += static_cast<int>(log.convergence.periods - periods);
     if (!std::isfinite(free.residual)) break;
     // A motion that decays below what limits it rests in the end; one that grows there is on its way.
@@ -160,6 +162,19 @@ std::string leaving_time(const Multipliers& multipliers, double period)
                 std::abs(std::arg(fastest)) / (two_pi * period), periods, periods * period);
 }
 
+/// Names the slip of a free motion whose offsets do not come to rest: it walks, or its slip decays.
+void note_slip(const std::vector<double>& slips, Outcome& outcome)
+{
+  constexpr double decayed = 0.5; // over the second half
+  const double now = slips.back();
+  const bool walks = now > decayed * slips[slips.size() / 2];
+  if (walks) outcome.kind = OutcomeKind::not_periodic;
+  outcome.reason = walks ? format("a joint walks by %.4g m a period", now)
+                         : format("a joint still slips by %.2g m a period, less in each: a larger -cycle_free_periods "
+                                  "follows it",
+                                  now);
+}
+
 /// How the search for an orbit ended, in words.
 Outcome outcome_of(const Convergence& convergence, StageEnding ending, double residual)
 {
@@ -176,6 +191,9 @@ Outcome outcome_of(const Convergence& convergence, StageEnding ending, double re
     outcome.kind = OutcomeKind::collapsed_to_equilibrium;
     outcome.reason = "the fluctuation fell below a tenth of the energy at the start and at the first event that limits "
                      "growth";
+    break;
+  case StageEnding::slips:
+    outcome.reason = "an offset still slips one way after " + std::to_string(convergence.periods) + " periods";
     break;
   case StageEnding::period_left_range:
     outcome.kind = OutcomeKind::not_periodic;
@@ -201,13 +219,15 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   ConvergenceLog log{progress};
   OrbitProblem problem = problem_of(flow, preconditioner, start, settings.tolerance);
   const Owned<Vec> first = state_of(start.u, start.v);
-  Orbit free = integrate_free_periods(problem, log, first, start.period, {settings.free_periods, 0});
+  Orbit free =
+      integrate_free_periods(problem, log, first, start.period, {settings.free_periods, 0, options.free_periods});
+  const int done = static_cast<int>(log.slips.size());
   // Below the first event nothing limits a motion; above it a start may be ten times too large and still find one.
   problem.least_fluctuation = std::min(free.fluctuation, start.first_event) * std::sqrt(0.1);
   const Search search{problem, options, log, start};
   Attempt found = attempt_from(search, free, nullptr);
-  const bool slow = leaves_too_slowly(search, found, settings.free_periods);
-  if (options.finish != Finish::none && !slow) found = search_on(search, std::move(found), settings.free_periods, free);
+  const bool slow = leaves_too_slowly(search, found, done);
+  if (options.finish != Finish::none && !slow) found = search_on(search, std::move(found), done, free);
   const bool goes_on = !slow && std::isfinite(free.residual);
   StageEnding ending = found.found.ending;
   if (ending == StageEnding::collapsed) ending = StageEnding::stalled; // unless the free motion decays, too
@@ -215,6 +235,7 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
 
   ShootingResult result;
   result.outcome = outcome_of(log.convergence, ending, found.found.orbit.residual);
+  if (!found.converged() && goes_on && slips_one_way(problem, free)) note_slip(log.slips, result.outcome);
   refuse_repelling(found.verdict, start.other_unstable.size(), result.outcome);
   result.multipliers = std::move(found.verdict.floquet.multipliers);
   if (slow) result.outcome.reason += leaving_time(result.multipliers, found.found.orbit.period);

@@ -79,6 +79,7 @@ Verdict judge(const OrbitProblem& problem, const ShootingOptions& options, Conve
   try
   {
     verdict.floquet = find_multipliers(problem, options, orbit, other_unstable);
+    multipliers.offsets = orbit.offsets.held;
     sought = "a motion beside it was watched";
     hold_against_motion(problem, options, log, orbit, verdict);
     const long periods = watched_periods(options, verdict);

@@ -19,6 +19,26 @@ void add_entry(Vec part, PetscInt row, double value)
   check(VecAssemblyEnd(part));
 }
 
+/// Orthonormal columns that span the displacements without the offsets held in the period recorded last.
+Eigen::MatrixXd displacements_without_held(const Flow& flow)
+{
+  PetscInt n = 0;
+  check(MatGetSize(flow.M, &n, nullptr));
+  Eigen::MatrixXd projector = Eigen::MatrixXd::Identity(n, n);
+  if (!flow.offsets.without_held) return projector;
+  for (PetscInt k = 0; k < n; ++k)
+  {
+    Owned<Vec> x;
+    check(MatCreateVecs(flow.M, x.put(), nullptr));
+    add_entry(x, k, 1);
+    flow.offsets.without_held(x);
+    const std::vector<double> column = all_entries(x);
+    projector.col(k) = Eigen::VectorXd::Map(column.data(), n);
+  }
+  const auto [parts, directions] = solve_dense_symmetric(projector);
+  return directions.rightCols((parts.array() > 0.5).count());
+}
+
 } // namespace
 
 Eigen::VectorXd coordinates_of(Vec state, double period)
@@ -44,12 +64,12 @@ Owned<Vec> state_at(const Eigen::VectorXd& coordinates, const Orbit& orbit)
 Eigen::MatrixXd coordinates_with_mass(const Flow& flow)
 {
   constexpr double rounding = 1e-14; // of the largest mass
-  const auto [masses, directions] = solve_dense_symmetric(dense_copy(flow.M));
+  const Eigen::MatrixXd U = displacements_without_held(flow);
+  const auto [masses, directions] = solve_dense_symmetric(U.transpose() * dense_copy(flow.M) * U);
   const Eigen::Index n = masses.size(), with_mass = (masses.array() > rounding * masses.maxCoeff()).count();
-  if (with_mass == n) return Eigen::MatrixXd::Identity(2 * n, 2 * n);
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(2 * n, n + with_mass);
-  result.topLeftCorner(n, n).setIdentity();
-  result.bottomRightCorner(n, with_mass) = directions.rightCols(with_mass);
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(2 * U.rows(), n + with_mass);
+  result.topLeftCorner(U.rows(), n) = U;
+  result.bottomRightCorner(U.rows(), with_mass) = with_mass == n ? U : U * directions.rightCols(with_mass);
   return result;
 }
 

@@ -15,7 +15,8 @@ Owned<Vec> state_at(const Eigen::VectorXd& coordinates, const Orbit& orbit);
 
 /// Orthonormal columns: of these coordinates all but velocities without mass, on which no motion depends. A theta step
 /// carries those along as (v_theta - (1 - theta) v)/theta, so that they have multipliers of their own, [-(1 -
-/// theta)/theta]^N a period of N steps: 1 in modulus at theta = 1/2. Collective.
+/// theta)/theta]^N a period of N steps: 1 in modulus at theta = 1/2. Motions along offsets that are held in the period
+/// recorded last are left out, too: each has a multiplier 1. Collective.
 Eigen::MatrixXd coordinates_with_mass(const Flow& flow);
 
 /// The matrix in these coordinates of a linear map that `multiply` applies to many states in place.

@@ -122,7 +122,6 @@ def test_friction_by_a_table_is_that_of_the_drive(scene, converged):
 
 def test_what_does_not_know_such_contacts_says_so(scene, squeal, tmp_path):
     wrong = {
-        "[cycle] does not know": "[cycle]\n",
         "is the last one": step("press", load=0.5),
         "holds 2 factors": step("press", forces=[1, 1]),
         "moves nothing": '[transient]\n[[initial]]\non = "pad"\n',

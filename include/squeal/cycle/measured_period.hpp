@@ -14,6 +14,7 @@ struct MeasuredPeriod
   int open_pairs_max = 0, stick_pairs_max = 0;
   std::vector<double> peak_to_peak; // [m] per probe
   History history;
+  JointUse joints{};
   std::vector<Owned<Vec>> displacements;            // [m] samples of u, evenly spread over the period
   std::vector<std::vector<ContactStatus>> statuses; // [step][pair]
 };

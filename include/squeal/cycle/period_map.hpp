@@ -8,7 +8,7 @@
 /// derivative, as long as what this neglects is small (section 6.2). A and W are then those of the period before. It
 /// solves contact no better than the period before calls for, too. All functions are collective. Those that integrate
 /// throw Interrupted where the run is asked to end.
-#include "squeal/shooting/flow.hpp"
+#include "squeal/cycle/joints.hpp"
 #include "squeal/transient/step_tangent.hpp"
 #include "squeal/transient/transient.hpp"
 
@@ -38,6 +38,8 @@ struct PeriodMap
   double recorded_step = 0;          // [s]
   bool keeps_step = false;           // where factors and passes of contact cost more than what is neglected
   KeptStep kept{};
+  JointMotion joints{}; // of the period integrated last; where there are undriven pairs
+  OwnRest rest{};       // at the offsets of that period
 };
 
 inline constexpr int enough_steps = 128; // a period: with as many at most, what finer ones change is in the bars
@@ -51,7 +53,10 @@ void move_by_part(const PeriodMap& map, double part, State& state);
 /// Records the contact of each step of a period.
 void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& grid);
 
-/// Gives the flow the exact tangent of the map. Borrows the map.
+/// Notes what undriven pairs did in the period recorded last from this start, and moves the rest to it.
+void note_joints(PeriodMap& map, Vec start);
+
+/// Gives the flow the exact tangent of the map, and the offsets of undriven pairs. Borrows the map.
 void add_tangent(PeriodMap& map, Flow& flow);
 
 /// The map as a flow for shooting. Borrows the map.

@@ -61,6 +61,14 @@ struct Equilibrium
   std::optional<LoadHistory> history{}; // where there are undriven pairs
 };
 
+/// A model at its sliding equilibrium, as every stage after it sees it. Borrows all three.
+struct SlidingEquilibrium
+{
+  const Structure& structure;
+  const Interface& interface;
+  const Equilibrium& equilibrium;
+};
+
 /// How an equilibrium is sought.
 struct EquilibriumOptions
 {
@@ -84,13 +92,17 @@ public:
   /// K is singular on a body that contact does not hold either (which body).
   Equilibrium at(const Structure& structure, const Interface& interface);
 
+  /// The rest of a structure with undriven pairs that are stuck elsewhere than at the end of its path. `offsets`: B u
+  /// there [m], a contact vector of which their tangential rows count. Collective.
+  Equilibrium at_offsets(const SlidingEquilibrium& path, const std::vector<double>& offsets);
+
   void expect(const std::vector<char>& closed) { expected_ = closed; }
   int factors() const { return factors_; } // made so far
 
   struct Kept;
 
 private:
-  Equilibrium at_end_of_path(const Structure& structure, const Interface& interface);
+  const PathOperators& operators_for(const Structure& structure, const Interface& interface);
 
   EquilibriumOptions options_;
   std::unique_ptr<Kept> kept_;
@@ -101,13 +113,5 @@ private:
 
 /// A single equilibrium. Collective. Error: as of Equilibria.
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options);
-
-/// A model at its sliding equilibrium, as every stage after it sees it. Borrows all three.
-struct SlidingEquilibrium
-{
-  const Structure& structure;
-  const Interface& interface;
-  const Equilibrium& equilibrium;
-};
 
 } // namespace squeal

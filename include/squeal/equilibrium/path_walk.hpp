@@ -47,6 +47,10 @@ struct PathWalk
 /// from closed gaps takes one: the problem has no scale.
 PathWalk walk_path(const PathProblem& problem);
 
+/// The state under the whole load with its pairs stuck where they are: one increment from reactions r and slips w that
+/// are minus the offsets of undriven pairs.
+PathWalk hold_at(const PathProblem& problem, const StickSlipState& from);
+
 /// The motion of the rows that the load drives and no forces of closed pairs within their friction resist, where there
 /// is one: no equilibrium exists then, whatever the path. `q`: by the load alone.
 std::optional<Eigen::VectorXd> unresisted_motion(const PathProblem& problem, const StickSlipFriction& friction,

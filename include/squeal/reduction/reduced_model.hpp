@@ -65,7 +65,11 @@ double highest_frequency(const std::vector<ComplexMode>& modes);
 std::vector<int> pairs_that_may_change(const Interface& interface, const Equilibrium& equilibrium,
                                        const ComplexMode& mode, double amplitude);
 
-/// Pairs that may come to rest or turn round in that motion's velocity. Ascending. Collective.
+/// Undriven pairs that are closed, and whose friction may reach its limit in that motion. Ascending. Collective.
+std::vector<int> pairs_that_may_slip(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
+                                     const ComplexMode& mode, double amplitude);
+
+/// Driven pairs that may come to rest or turn round in that motion's velocity. Ascending. Collective.
 std::vector<int> pairs_that_may_turn(const Interface& interface, const ComplexMode& mode, double amplitude);
 
 inline constexpr PetscInt all_attachments = std::numeric_limits<PetscInt>::max();

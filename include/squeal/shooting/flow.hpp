@@ -40,6 +40,24 @@ struct TimeGrid
   int steps(int of_flow) const { return finer * of_flow + more; }
 };
 
+/// The motion in a period of a system's offsets: displacements that stay as they are while friction holds them, and
+/// that nothing leads back (src/README.md, section 6.13).
+struct OffsetMotion
+{
+  double slip = 0;  // [m] the largest way of one that moves one way alone
+  double swing = 0; // [m] the largest of a vibration, which this is held against
+  int held = 0;     // those that stay as they are throughout
+};
+
+/// The offsets of a flow; empty functions: it has none.
+struct Offsets
+{
+  std::function<OffsetMotion()> motion{};       // of the period integrated last
+  std::function<void(Vec rest)> find_rest{};    // the state of rest at the offsets of that period
+  std::function<void(Vec part)> without_held{}; // takes from u or v their part along those held in the period recorded
+                                                // last
+};
+
 /// The period map Phi_T: the state a time T after a start.
 struct Flow
 {
@@ -53,6 +71,7 @@ struct Flow
   /// The slow motions of this period, which becomes the one recorded last. Empty: none are known.
   std::function<SlowMotions(double period, Vec start)> slow_motions{};
   double work = 0; // counted, of a period (squeal/base/cost.hpp)
+  Offsets offsets{};
 };
 
 /// y = P^-1 x, an approximate inverse of dPhi_T/dx - I at this period; x and y are states. Empty: P = -I.

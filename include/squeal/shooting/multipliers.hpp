@@ -63,6 +63,7 @@ struct Multipliers
   long periods = 0;                                      // columns of the tangent over one period each
   MultiplierMethod method = MultiplierMethod::automatic; // that was used
   std::string refusal;                                   // why the oblique projection did not serve, or did not decide
+  int offsets = 0;                                       // held, each with a multiplier 1 that is left out
   std::vector<SeenGrowth> seen{};                        // from smaller and smaller parts; the last is the smallest
 
   /// Of the modulus of a value.

@@ -23,8 +23,10 @@ struct Orbit
   double period = 0;      // [s]
   Owned<Vec> defect;      // Phi_T(x) - x
   Owned<Vec> rate;        // dPhi_T/dT
-  double fluctuation = 0; // |x - equilibrium| in the energy norm
+  double fluctuation = 0; // |x - rest| in the energy norm
   double residual = 0;    // |defect| / fluctuation
+  Owned<Vec> rest{};      // at its own offsets; null: the problem's equilibrium
+  OffsetMotion offsets{};
 };
 
 /// A deep copy.
@@ -77,6 +79,7 @@ struct ConvergenceLog
   Progress& progress;
   Convergence convergence{};
   std::optional<double> done{}; // of the progress's total, where the number of periods does not tell
+  std::vector<double> slips{};  // [m] one way in each free period
 };
 
 /// Why a stage stopped.
@@ -86,6 +89,7 @@ enum class StageEnding
   stalled,
   collapsed,         // onto the equilibrium
   period_left_range, // of a factor of two about the first one
+  slips,             // an offset one way, as long as it was followed
 };
 
 /// The best orbit that a stage met, and why it stopped.
@@ -110,7 +114,11 @@ bool admissible_period(const OrbitProblem& problem, double period);
 /// Whether the orbit is falling onto the equilibrium.
 bool collapsing(const OrbitProblem& problem, const Orbit& orbit);
 
-/// x - equilibrium
+/// Whether an offset moves one way by more than the tolerance, or 1e-5 where there is none. A correction would end it
+/// where no motion does.
+bool slips_one_way(const OrbitProblem& problem, const Orbit& orbit);
+
+/// x - rest
 Owned<Vec> fluctuation_of(const OrbitProblem& problem, const Orbit& orbit);
 
 } // namespace squeal

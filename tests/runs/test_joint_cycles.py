@@ -1,0 +1,156 @@
+"""Cycles of the mode-coupling oscillator whose spring ends at a bracket that friction alone holds: three nodes in a row,
+each pressed on the floor by its own force, each with its own offset.
+
+Stuck, the bracket is clamped, and the cycle is the oscillator's own. The other values are limits of short steps, by an
+integration of events and steps of an independent program.
+"""
+
+import pytest
+
+POINTS = """
+[[point]]
+name = "pad"
+at = [0, 0, 0]
+mass = 1
+free = "x y"
+[[point]]
+name = "disc"
+at = [0, 0, 0]
+mass = 0.5
+free = "y"
+[[point]]
+name = "floor"
+at = [0, 0, 0]
+mass = 1
+free = ""
+[[spring]]
+from = "pad"
+to = "b1"
+direction = "x"
+stiffness = 1
+damping = 0.02
+[[spring]]
+from = "pad"
+direction = "y"
+stiffness = 0.4
+damping = 0.02
+[[spring]]
+from = "pad"
+direction = [1, -1, 0]
+stiffness = 0.2
+[[spring]]
+from = "disc"
+direction = "y"
+stiffness = 1.2
+damping = 0.02
+[[spring]]
+from = "b1"
+to = "b2"
+direction = "x"
+stiffness = 4
+damping = 0.02
+[[spring]]
+from = "b2"
+to = "b3"
+direction = "x"
+stiffness = 4
+damping = 0.02
+[[spring]]
+from = "b3"
+direction = "x"
+stiffness = 0.05
+[[force]]
+on = "pad"
+vector = [0, -1, 0]
+[[contact]]
+rotor = "disc"
+stator = "pad"
+normal = "y"
+tangents = ["x"]
+velocity = [0.6, 0, 0]
+[friction]
+coefficient = 0.3
+[modes]
+band = 1
+[[probe]]
+name = "b1"
+on = "b1"
+direction = "x"
+"""
+
+NODE = """
+[[point]]
+name = "b{number}"
+at = [0, 0, 0]
+mass = 0.05
+free = "x y"
+[[force]]
+on = "b{number}"
+vector = [0, {force}, 0]
+[[contact]]
+rotor = "floor"
+stator = "b{number}"
+normal = "y"
+tangents = ["x"]
+friction = 0.5
+"""
+
+CYCLE = """
+[cycle]
+steps_per_period = {steps}
+tolerance = 1e-8
+"""
+
+# preloads, offsets held, period and mean energy in the limit of short steps, largest other multipliers
+STUCK, MICRO, SLIDING = (2, 20, 20), (1.2, 6, 6), (0.5, 0.15, 0.15)
+
+
+@pytest.fixture
+def scene(tmp_path):
+    def write(preloads, steps=400, more=""):
+        nodes = "".join(NODE.format(number=i, force=-p) for i, p in enumerate(preloads, 1))
+        file = tmp_path / "scene.toml"
+        file.write_text(POINTS + nodes + CYCLE.format(steps=steps) + more)
+        return file
+
+    return write
+
+
+def real_values(cycle):
+    return [value["real"] for value in cycle["multipliers"]["values"]]
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_a_stuck_bracket_is_clamped(scene, converged, ranks):
+    cycle = converged(scene(STUCK), ranks=ranks).report["cycle"]
+    assert cycle["period"] == pytest.approx(5.954581, rel=1e-6)  # of these steps; 5.954461004653 without
+    assert cycle["mean_fluctuating_energy"] == pytest.approx(1.4608, rel=3e-3)
+    assert cycle["joints"]["held"] == 3 and cycle["joints"]["slipping"] == 0
+    assert cycle["multipliers"]["offsets_held"] == 3 and cycle["multipliers"]["stability"] == "stable"
+    for exact in (0.7131, 0.4340):
+        assert min(abs(value - exact) for value in real_values(cycle)) < 2e-3
+
+
+def test_shorter_steps_come_to_the_clamped_limit(scene, converged):
+    coarse, fine = (converged(scene(STUCK, steps), ranks=1).report["cycle"]["period"] for steps in (400, 1600))
+    assert abs(fine - 5.954461004653) < 0.3 * abs(coarse - 5.954461004653)
+    assert fine == pytest.approx(5.954461004653, rel=1e-5)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_node_that_slips_both_ways_forgets_its_offset(scene, converged, ranks):
+    cycle = converged(scene(MICRO), ranks=ranks).report["cycle"]
+    assert cycle["period"] == pytest.approx(5.950161, rel=1e-6)
+    assert cycle["peak_to_peak"]["b1"] == pytest.approx(0.03134, rel=1e-3)
+    assert cycle["joints"]["held"] == 2 and cycle["joints"]["slipping"] == 1
+    assert cycle["joints"]["work"][1] == pytest.approx(-0.0377, rel=3e-3)
+    assert cycle["multipliers"]["offsets_held"] == 2
+    for exact in (0.715, 0.452, -0.05):
+        assert min(abs(value - exact) for value in real_values(cycle)) < 1e-2
+
+
+def test_a_bracket_walks_until_its_spring_holds_it(scene, converged):
+    cycle = converged(scene(SLIDING), ranks=1).report["cycle"]
+    assert cycle["period"] == pytest.approx(5.963759, rel=1e-6)
+    assert cycle["joints"]["held"] == 1 and cycle["multipliers"]["offsets_held"] == 1
+    assert min(abs(value - 0.9225) for value in real_values(cycle)) < 1e-2
