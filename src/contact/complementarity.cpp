@@ -149,7 +149,6 @@ StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vecto
     }
     for (const std::size_t i : wrong) closed[i] = !closed[i];
   }
-  result.outcome = result.iterations <= max_iterations ? StatusOutcome::cycles : StatusOutcome::not_converged;
   result.closed = std::move(closed);
   return result;
 }
@@ -172,44 +171,6 @@ double unilateral_residual(const std::vector<double>& reaction, const std::vecto
     otherwise = std::max(otherwise, rho[i] * std::abs(pull[i]));
   }
   return error == 0 ? 0 : error / (scale > 0 ? scale : otherwise);
-}
-
-ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
-                                       long max_iterations)
-{
-  const std::size_t n = problem.q.size();
-  const std::vector<double> scale(n, 1 / problem.compliance);
-  ProjectionSolution result;
-  result.reaction.assign(n, 0.);
-  std::vector<double> g(n);
-  double best = HUGE_VAL;
-  for (;; ++result.iterations)
-  {
-    VectorXd::Map(g.data(), static_cast<Index>(n)) = as_vector(problem.q) + problem.M * as_vector(result.reaction);
-    result.residual = unilateral_residual(result.reaction, g, scale, problem.q);
-    best = std::min(best, result.residual);
-    if (result.residual <= tolerance || !std::isfinite(result.residual) || result.iterations >= max_iterations)
-      return result;
-    if (result.iterations % 50 == 49 && result.residual > 10 * best) rho /= 2;
-    for (std::size_t i = 0; i < n; ++i) result.reaction[i] = std::max(0., result.reaction[i] - rho * g[i]);
-  }
-}
-
-double largest_eigenvalue(const MatrixXd& A, const VectorXd& added, int iterations)
-{
-  VectorXd x(A.rows()), image(A.rows());
-  for (Index i = 0; i < x.size(); ++i) x[i] = 1 + 0.5 * std::sin(7. * static_cast<double>(i) + 1);
-  double eigenvalue = 0;
-  for (int iteration = 0; iteration < iterations; ++iteration)
-  {
-    if (x.norm() == 0) return 0;
-    x.normalize();
-    image.noalias() = A.selfadjointView<Eigen::Lower>() * x;
-    image += added.cwiseProduct(x);
-    eigenvalue = image.norm();
-    x.swap(image);
-  }
-  return eigenvalue;
 }
 
 } // namespace squeal

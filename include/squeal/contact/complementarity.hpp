@@ -6,7 +6,7 @@
 /// Status iteration: with the pairs split into closed (g = 0) and open (r = 0) the problem is linear; every pair whose
 /// sign is wrong changes status. When that stops reducing their number, only the last one does. This block principal
 /// pivoting (Judice and Pires 1994) is finite when M is a P-matrix, which too much friction prevents. Beyond, a split
-/// met twice ends it. Arithmetic of one rank.
+/// met twice ends it, and Lemke's path goes on. Arithmetic of one rank.
 #include <Eigen/LU>
 #include <memory>
 #include <optional>
@@ -54,9 +54,9 @@ SplitSolution solve_split(const ComplementarityProblem& problem, const std::vect
 enum class StatusOutcome
 {
   converged,
-  cycles,        // a split was met twice
   singular,      // a split whose signs fit does not balance
-  not_converged, // within the iterations allowed
+  impossible,    // there is no solution
+  not_converged, // a split was met twice, or the iterations allowed did not do
 };
 
 /// The split that the status iteration ended with, one entry a pair.
@@ -73,6 +73,11 @@ struct StatusSolution
 /// ended; the solver borrows the problem. Error: an entry is not finite.
 StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, long max_iterations);
 
+/// Solves by Lemke's path from the split `closed`, and by trying all splits of up to 12 pairs. "Impossible" is proved:
+/// no split fits, or no reactions at all keep every gap from being negative. The solver borrows the problem. Error: an
+/// entry is not finite.
+StatusSolution solve_by_pivoting(const ComplementarityProblem& problem, const std::vector<char>& closed);
+
 /// Whether the symmetric part of M is positive definite, N being the identity: then there is one solution and no other.
 bool has_one_solution(const ComplementarityProblem& problem);
 
@@ -80,21 +85,5 @@ bool has_one_solution(const ComplementarityProblem& problem);
 /// where no pair has a reaction.
 double unilateral_residual(const std::vector<double>& reaction, const std::vector<double>& gap,
                            const std::vector<double>& rho, const std::vector<double>& pull);
-
-/// The end of the projection iteration.
-struct ProjectionSolution
-{
-  int iterations = 0;
-  double residual = 0; // the unilateral residual with rho = 1/compliance, its pull q
-  std::vector<double> reaction;
-};
-
-/// Iterates r <- max(0, r - rho g), g = q + M r, from r = 0; N must be the identity. `rho` [N/m] is halved when the
-/// residual grows. `tolerance`: of the residual. Ends before it is met where `is_over` says so.
-ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
-                                       long max_iterations);
-
-/// Largest eigenvalue of a symmetric positive semi-definite A with a diagonal added, by power iteration: a lower bound.
-double largest_eigenvalue(const Eigen::MatrixXd& A, const Eigen::VectorXd& added, int iterations);
 
 } // namespace squeal
