@@ -135,10 +135,12 @@ SlowMotions slow_motions_of(const ReducedSpectrum& spectrum, const ReducedModel&
 {
   SlowMotions slow;
   slow.values = spectrum.values;
-  slow.errors.assign(spectrum.values.size(), 0);
+  slow.values.resize(number_of(spectrum.values, projected_values));
+  slow.errors.assign(slow.values.size(), 0);
   slow.rises = slow.errors;
-  slow.right = motions_of(coordinates, spectrum.right, pattern);
-  slow.left = motions_of(coordinates, energy_representatives(model, spectrum.left), pattern);
+  const auto count = static_cast<Index>(slow.values.size()); // leading columns span the vectors of leading values
+  slow.right = motions_of(coordinates, spectrum.right.leftCols(count), pattern);
+  slow.left = motions_of(coordinates, energy_representatives(model, spectrum.left.leftCols(count)), pattern);
   slow.correct = [coordinates, columns = spectrum.columns](Complex m, Vec real, Vec imaginary)
   { apply_resolvent(columns, coordinates, m, real, imaginary); };
   return slow;
@@ -146,7 +148,7 @@ SlowMotions slow_motions_of(const ReducedSpectrum& spectrum, const ReducedModel&
 
 void add_changes(const std::vector<Complex>& others, double part, SlowMotions& slow)
 {
-  for (std::size_t i = 0; i < others.size(); ++i)
+  for (std::size_t i = 0; i < slow.values.size(); ++i)
   {
     const double change = std::abs(others[i]) - std::abs(slow.values[i]);
     slow.errors[i] += part * std::abs(change);

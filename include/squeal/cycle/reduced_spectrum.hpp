@@ -23,13 +23,17 @@ struct LargeValues
 };
 
 /// Those that a verdict is about.
-inline constexpr LargeValues deciding_values{0.85, 4, 24};
+inline constexpr LargeValues deciding_values{0.85, 4, 48};
+
+/// Those whose vectors the full model is projected on: each costs a product with its tangent. A search bounds the rest.
+inline constexpr LargeValues projected_values{0.85, 4, 24};
 
 /// Collective among the map's ranks.
 ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
                                   const LargeValues& wanted);
 
-/// The spectrum's values, vectors and resolvent for motions that have these coordinates in the model.
+/// The projected values of the spectrum, their vectors and the resolvent for motions that have these coordinates in the
+/// model.
 SlowMotions slow_motions_of(const ReducedSpectrum& spectrum, const ReducedModel& model,
                             const ReducedCoordinates& coordinates, Vec pattern);
 
