@@ -95,14 +95,17 @@ StageResult shoot_by_multisecant(const OrbitProblem& problem, const ShootingOpti
     Orbit next = evaluate(problem, log, moved, orbit.period + step.period);
     ++log.convergence.iterations;
     record_full(log, ShootingStage::multisecant, next);
-    if (slips_one_way(problem, next))
-      next = integrate_free_periods(problem, log, next.state, next.period, {1, 0, options.free_periods});
+    const bool slips = slips_one_way(problem, next);
+    if (slips) next = integrate_free_periods(problem, log, next.state, next.period, {1, 0, options.free_periods});
     if (collapsing(problem, next) || !std::isfinite(next.residual))
     {
       best.ending = StageEnding::collapsed;
       return best;
     }
-    keep_secant(problem, options, multisecant, std::move(step), next, defect);
+    if (slips)
+      defect = preconditioned(problem, next.period, next.defect);
+    else
+      keep_secant(problem, options, multisecant, std::move(step), next, defect);
     ++since_best;
     if (next.residual < best.orbit.residual)
     {
