@@ -48,9 +48,8 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
 struct PointProblem
 {
   const SlidingEquilibrium& sliding;
-  double band = 0;          // [Hz]
-  double tolerance = 0;     // on the backward error of right and left vectors
-  PetscInt dense_limit = 0; // up to this size a problem that these leave inexact is solved on all degrees of freedom
+  double band = 0;                           // [Hz]
+  double tolerance = 0;                      // on the backward error of right and left vectors
   const std::function<void()>& end_if_asked; // called before each solution
 };
 
