@@ -69,7 +69,7 @@ struct Way
 /// Why the search for the cycle cannot run; nothing if it can.
 std::optional<Outcome> cycle_not_sought(const SlidingPoint& point, const MotionStart& start, const Scene& scene)
 {
-  if (!scene.cycle.enabled) return Outcome{OutcomeKind::off, "the scene has no [cycle], or turns it off"};
+  if (const std::string off = why_off(Stage::cycle, point, scene); !off.empty()) return Outcome{OutcomeKind::off, off};
   std::string reason = no_mode_among(point, followed_modes(point, scene));
   if (reason.empty()) reason = start.missing;
   if (reason.empty()) return {};
@@ -230,8 +230,7 @@ void seek_from_checkpoint(MotionSearch& search, const char* name)
 void seek_from_start(MotionSearch& search, const char* name)
 {
   if (const std::optional<Outcome>& why = search.not_sought)
-    search.found.cycle =
-        run_stage(search.run, Stage::cycle, [&] { return not_run<LimitCycle>(why->kind, why->reason); });
+    search.found.cycle = not_run<LimitCycle>(why->kind, why->reason);
   else
     take(seek_cycle(search, name, search.scene.cycle), search.found);
 }
@@ -246,7 +245,6 @@ bool motion_goes_on(const LimitCycle& cycle, int unstable)
 SettledMotion settled_motion(const MotionSearch& search)
 {
   const LimitCycle& cycle = search.found.cycle;
-  if (!has_run(cycle.outcome)) return not_run<SettledMotion>(OutcomeKind::off, "no cycle was sought");
   if (succeeded(cycle.outcome)) return not_run<SettledMotion>(OutcomeKind::skipped, "the cycle is the answer");
   if (!motion_goes_on(cycle, search.point.modes.unstable_count))
     return not_run<SettledMotion>(OutcomeKind::skipped, "there is no motion to go on from");
@@ -262,7 +260,8 @@ bool may_settle(const MotionSearch& search)
 void seek_settled_motion(MotionSearch& search, const char* name)
 {
   SettledMotion& settled = search.found.settled;
-  settled = run_stage(search.run, Stage::settled, [&] { return settled_motion(search); });
+  const std::string off = has_run(search.found.cycle.outcome) ? "" : "no cycle was sought";
+  settled = run_stage(search.run, Stage::settled, off, [&] { return settled_motion(search); });
   if (has_run(settled.outcome)) search.found.attempts.push_back({name, settled.steps_per_period, settled.outcome});
 }
 

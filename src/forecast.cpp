@@ -11,7 +11,6 @@
 #include "squeal/reduction/reduced_model.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <numeric>
 

@@ -239,8 +239,6 @@ void check_state_file(const std::string& key, const std::filesystem::path& file,
   if (!file.has_filename() || is_folder(file) || file == results) throw Error(label + "it is a folder; name a file");
   if (std::error_code failed; !is_file(file) && std::filesystem::exists(file, failed))
     throw Error(label + "it is a device or a pipe, which the state would replace; name a file");
-  if (is_used_meanwhile(file, results))
-    throw Error(label + "the run uses this name meanwhile; give the state another one");
   if (folder == results) return;
   if (!is_folder(folder)) throw Error(label + "there is no folder " + shortened(folder) + "; make it first");
   if (access((is_file(file) ? file : folder).c_str(), W_OK) != 0 || access(folder.c_str(), W_OK) != 0)
@@ -306,8 +304,6 @@ int run_program(const Arguments& arguments)
   broadcast(request, comm);
   on_every_rank(comm, [&] { open_checkpoints({results.checkpoints(), request, arguments.restart}); });
   write_request(scene, results.run(), results.partial(), comm);
-  scene.transient.save_state = results.meanwhile(scene.transient.save_state);
-  scene.cycle.save_state = results.meanwhile(scene.cycle.save_state);
   try
   {
     return static_cast<int>(run(scene, options, results, comm));

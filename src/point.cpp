@@ -1,7 +1,10 @@
 #include "squeal/point.hpp"
 
+#include "squeal/base/cost.hpp"
 #include "squeal/mesh/mesh.hpp"
 #include "squeal/modes/modes_checkpoint.hpp"
+
+#include <algorithm>
 
 namespace squeal
 {
@@ -79,13 +82,21 @@ std::vector<Estimate> estimates_at(const SlidingPoint& point, const Scene& scene
 {
   std::vector<Estimate> estimates;
   const std::string reason = no_mode_to_follow(point, scene);
-  if (!scene.estimate.enabled && !scene.cycle.enabled && !follows_a_mode(scene.transient))
-    estimates.push_back(not_run<Estimate>(OutcomeKind::off, "the scene turns it off"));
-  else if (!reason.empty())
+  if (!reason.empty())
     estimates.push_back(not_run<Estimate>(OutcomeKind::skipped, reason));
   else
     for (const ComplexMode& mode : followed_modes(point, scene)) estimates.push_back(estimate_of(point, mode));
   return estimates;
+}
+
+/// Whether several modes oscillate and grow, each of which may lead to a motion of its own, and a few trajectories of
+/// the model cost little.
+bool may_lead_elsewhere(const SlidingPoint& point)
+{
+  constexpr double steps = 16. * 400 * 256; // of starts, periods each, steps a period
+  const auto oscillates = [](const ComplexMode& mode) { return mode.frequency_hz() > 0; };
+  return steps * work_of_step(point.model->structure) <= affordable_work &&
+         std::ranges::count_if(point.modes.unstable(), oscillates) > 1;
 }
 
 } // namespace
@@ -93,25 +104,28 @@ std::vector<Estimate> estimates_at(const SlidingPoint& point, const Scene& scene
 SlidingPoint find_sliding(const Model& model, const ProgramOptions& options, const StageRunner& run)
 {
   SlidingPoint point{&model, {}, {}, {}, {}};
-  point.equilibrium = run_stage(
-      run, Stage::equilibrium, [&] { return find_equilibrium(model.structure, model.interface, options.equilibrium); });
+  point.equilibrium =
+      run_stage(run, Stage::equilibrium, "",
+                [&] { return find_equilibrium(model.structure, model.interface, options.equilibrium); });
   return point;
 }
 
 SlidingPoint with_small_motions(SlidingPoint point, const Scene& scene, const ProgramOptions& options,
                                 const StageRunner& run)
 {
-  point.modes = run_stage(run, Stage::modes,
+  point.modes = run_stage(run, Stage::modes, why_off(Stage::modes, point, scene),
                           [&]
                           {
-                            const bool found = point.equilibrium.outcome.kind == OutcomeKind::converged;
-                            if (found && (seeks_modes(scene) || scene.response))
+                            if (point.equilibrium.outcome.kind == OutcomeKind::converged)
                               point.linearised = linearise(point.sliding());
                             return modes_at(point, scene, options.modes);
                           });
-  const std::string left_out =
-      run(Stage::estimate, [&] { return point.estimates = estimates_at(point, scene), false; });
-  if (!left_out.empty()) point.estimates.push_back(not_run<Estimate>(OutcomeKind::skipped, left_out));
+  if (const std::string off = why_off(Stage::estimate, point, scene); !off.empty())
+    point.estimates.push_back(not_run<Estimate>(OutcomeKind::off, off));
+  else if (const std::string left_out =
+               run(Stage::estimate, [&] { return point.estimates = estimates_at(point, scene), false; });
+           !left_out.empty())
+    point.estimates.push_back(not_run<Estimate>(OutcomeKind::skipped, left_out));
   return point;
 }
 
@@ -164,11 +178,42 @@ bool seeks_modes(const Scene& scene)
   return scene.modes.enabled || scene.cycle.enabled || follows_a_mode(scene.transient);
 }
 
+std::string why_off(Stage which, const SlidingPoint& point, const Scene& scene)
+{
+  const auto unless = [](bool is_asked, const char* reason) { return std::string(is_asked ? "" : reason); };
+  switch (which)
+  {
+  case Stage::modes:
+    return unless(seeks_modes(scene) || scene.response, "the scene turns it off");
+  case Stage::estimate:
+    return unless(scene.estimate.enabled || scene.cycle.enabled || follows_a_mode(scene.transient),
+                  "the scene turns it off");
+  case Stage::response:
+    return unless(scene.response.has_value(), "the scene has no [response]");
+  case Stage::transient:
+    return unless(scene.transient.enabled, "the scene has no [transient], or turns it off");
+  case Stage::cycle:
+    return unless(scene.cycle.enabled, "the scene has no [cycle], or turns it off");
+  case Stage::attractors:
+    return unless(scene.cycle.enabled && (scene.cycle.starts > 0 || may_lead_elsewhere(point)),
+                  "cycle.starts is 0, and no other starts are sought by themselves");
+  case Stage::branch:
+    return unless(scene.branch.has_value(), "the scene has no [branch]");
+  case Stage::sensitivity:
+    return unless(scene.sensitivity.has_value(), "the scene has no [sensitivity]");
+  case Stage::sweep:
+    return unless(scene.sweep.has_value(), "the scene has no [sweep]");
+  case Stage::robustness:
+    return unless(scene.robustness.has_value(), "the scene has no [robustness]");
+  default:
+    return {};
+  }
+}
+
 Trajectory find_transient(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options)
 {
   const TransientSettings& settings = scene.transient;
   const std::string reason = no_mode_to_follow(point, scene);
-  if (!settings.enabled) return not_run<Trajectory>(OutcomeKind::off, "the scene has no [transient], or turns it off");
   if (point.equilibrium.outcome.kind != OutcomeKind::converged || (!reason.empty() && !starts_without_a_mode(settings)))
     return not_run<Trajectory>(OutcomeKind::skipped, reason);
   const ComplexMode* followed = reason.empty() ? &point.modes.modes.front() : nullptr;

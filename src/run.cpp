@@ -152,7 +152,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   const auto save = [&] { write_results(report, scene, model, results.partial(), comm); };
   const auto stage = [&](Stage which, auto& result, const auto& work)
   {
-    result = run_stage(runner, which, work);
+    result = run_stage(runner, which, why_off(which, report.point, scene), work);
     if (has_run(result.outcome)) save();
   };
   const SlidingPoint& point = report.point = find_sliding(model, options, runner);

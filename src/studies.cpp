@@ -1,6 +1,5 @@
 #include "squeal/studies.hpp"
 
-#include "squeal/base/cost.hpp"
 #include "squeal/swept_motion.hpp"
 
 #include <algorithm>
@@ -13,7 +12,6 @@ namespace squeal
 
 Response run_response(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options)
 {
-  if (!scene.response) return not_run<Response>(OutcomeKind::off, "the scene has no [response]");
   if (point.equilibrium.outcome.kind != OutcomeKind::converged)
     return not_run<Response>(OutcomeKind::skipped, "there is no equilibrium to linearise about");
   std::vector<int> excitations;
@@ -26,16 +24,6 @@ Response run_response(const SlidingPoint& point, const Scene& scene, const Progr
 
 namespace
 {
-
-/// Whether several modes oscillate and grow, each of which may lead to a motion of its own, and a few trajectories of
-/// the model cost little.
-bool may_lead_elsewhere(const SlidingPoint& point)
-{
-  constexpr double steps = 16. * 400 * 256; // of starts, periods each, steps a period
-  const auto oscillates = [](const ComplexMode& mode) { return mode.frequency_hz() > 0; };
-  return steps * work_of_step(point.model->structure) <= affordable_work &&
-         std::ranges::count_if(point.modes.unstable(), oscillates) > 1;
-}
 
 /// The modes, their pairs and five random sums; as many as are integrated together at most.
 int starts_beside(int unstable)
@@ -53,8 +41,6 @@ Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const
   CycleSettings settings = scene.cycle;
   if (settings.steps_per_period == 0)
     settings.steps_per_period = std::clamp(motion.cycle.steps_per_period, first_steps, enough);
-  if (!settings.enabled || (settings.starts == 0 && !may_lead_elsewhere(point)))
-    return not_run<Attractors>(OutcomeKind::off, "cycle.starts is 0, and no other starts are sought by themselves");
   const std::vector<ComplexMode>& modes = point.modes.modes;
   const bool chosen = settings.starts == 0;
   if (chosen) settings.starts = starts_beside(point.modes.unstable_count);
@@ -122,7 +108,6 @@ SlidingStability stability_beside_branch(NearbyModels& models, const Scene& scen
 BrakeBranch run_branch(const SlidingPoint& point, const Motion& motion, const Scene& scene,
                        const ProgramOptions& options)
 {
-  if (!scene.branch) return not_run<BrakeBranch>(OutcomeKind::off, "the scene has no [branch]");
   const double tolerance = scene.cycle.tolerance > 0 ? scene.cycle.tolerance : plain_tolerance;
   const std::string reason = no_cycle_to_follow(motion.cycle, tolerance);
   if (!reason.empty()) return not_run<BrakeBranch>(OutcomeKind::skipped, reason);
@@ -138,7 +123,6 @@ BrakeBranch run_branch(const SlidingPoint& point, const Motion& motion, const Sc
 
 Sensitivity run_sensitivity(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options)
 {
-  if (!scene.sensitivity) return not_run<Sensitivity>(OutcomeKind::off, "the scene has no [sensitivity]");
   const std::string reason = no_unstable_mode(point);
   if (!reason.empty()) return not_run<Sensitivity>(OutcomeKind::skipped, reason);
   if (point.model->structure.H.get())
@@ -161,7 +145,6 @@ Sensitivity run_sensitivity(const SlidingPoint& point, const Scene& scene, const
 
 Sweep run_scene_sweep(const Model& model, const Scene& scene, const ProgramOptions& options)
 {
-  if (!scene.sweep) return not_run<Sweep>(OutcomeKind::off, "the scene has no [sweep]");
   if (model.structure.H.get() && scene.sweep->directions == SweepDirections::both)
     return not_run<Sweep>(OutcomeKind::refused, "what the circulatory part of given matrices becomes in the other "
                                                 "direction of rotation is not known, as another code's friction is "
@@ -180,7 +163,6 @@ Sweep run_scene_sweep(const Model& model, const Scene& scene, const ProgramOptio
 
 Robustness run_robustness(const Model& model, const Scene& scene, const ProgramOptions& options)
 {
-  if (!scene.robustness) return not_run<Robustness>(OutcomeKind::off, "the scene has no [robustness]");
   NearbyModels models(model, scene, PETSC_COMM_SELF);
   std::vector<std::string> keys;
   for (const UncertainNumber& number : scene.uncertain) keys.push_back(number.key);

@@ -40,8 +40,8 @@ def draw_probabilities(axes, robustness):
 
 def draw_growth(axes, table):
     """Histogram of growth over omega of the mode where it is largest; unstable samples in red."""
-    chosen = (table["known"] == 1) & (table["frequency"] > 0)
-    ratio = 100 * table["growth_rate"][chosen] / (2 * np.pi * table["frequency"][chosen])
+    chosen = (table["known"] == 1) & (table["frequency_hz"] > 0)
+    ratio = 100 * table["growth_rate"][chosen] / (2 * np.pi * table["frequency_hz"][chosen])
     width = max(np.ptp(ratio) / 40, 1e-12)
     bins = width * np.arange(np.floor(ratio.min() / width), np.ceil(ratio.max() / width) + 1.5)  # zero is an edge
     unstable = table["unstable_modes"][chosen] > 0
@@ -70,7 +70,9 @@ def draw_drivers(axes, robustness):
 
 def draw_robustness(runs):
     (results, robustness), *_ = those_with(runs, robustness_of)
-    table = {name: results.series("robustness", name) for name in ("known", "growth_rate", "frequency", "unstable_modes")}
+    lines = results.lines("robustness")
+    table = {name: np.array([float(line[name] or "nan") for line in lines])
+             for name in ("known", "growth_rate", "frequency_hz", "unstable_modes")}
     rows = max(len(robustness["numbers"]), 1 + min(SHOWN, len(robustness["modes"])))
     figure, axes = plt.subplots(1, 3, figsize=(13.5, 2.4 + 0.35 * rows))
     for ax in axes:

@@ -13,10 +13,17 @@ MARKS = "os^Dvp*X"
 SHADES = ["black", "#1b6ca8", "#7b3fa0"]  # of marks on the yellow and red of a map
 
 
-def tables_of(results):
-    """What history.h5 holds of the sweep; frequencies and growth rates have one column for each followed mode."""
-    names = ("value", "direction", "unstable_modes", "frequency", "growth_rate")
-    return {name: results.series("sweep", name) for name in names}
+def tables_of(results, sweep):
+    """Points in rows; frequencies and growth rates have one column for each followed mode, NaN where it was not found."""
+    points, keys = sweep["points"], (*sweep["keys"], "direction")
+    frequency, growth = np.full((2, len(points), sweep["followed_modes"]), np.nan)
+    rows = {(*p["values"], p["direction"]): row for row, p in enumerate(points)}
+    for line in results.lines("sweep"):
+        if line["track"]:
+            place = rows[tuple(float(line[key]) for key in keys)], int(line["track"])
+            frequency[place], growth[place] = float(line["frequency_hz"]), float(line["growth_rate"])
+    return {"value": np.array([p["values"] for p in points]), "direction": np.array([p["direction"] for p in points]),
+            "frequency": frequency, "growth_rate": growth}
 
 
 def motions_of(sweep, direction):
@@ -182,7 +189,7 @@ def draw_chart(results, sweep):
     """The lock-in chart; of random points the least stable mode alone."""
     found = [p for p in sweep["points"] if "growth_rate" in p]
     directions = [d for d in (1, -1) if any(p["direction"] == d for p in sweep["points"])]
-    table = tables_of(results) if sweep["followed_modes"] else None
+    table = tables_of(results, sweep) if sweep["followed_modes"] else None
     size, unit = frequency_unit(np.nanmax(table["frequency"]) if table else max(p["frequency_hz"] for p in found))
     motions = {direction: motions_of(sweep, direction) for direction in directions}
     rows_of_axes = 3 if any(motion["frequency_hz"] for pairs in motions.values() for _, motion in pairs) else 2

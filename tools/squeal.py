@@ -13,6 +13,7 @@ results = squeal.Results("results/pin_on_disc") reads a run made before. Tables 
 compute raises Missing, what goes wrong SquealError.
 """
 
+import csv
 import functools
 import json
 import subprocess
@@ -178,7 +179,7 @@ class Results:
         return self._array("fields.h5", name)
 
     def series(self, run, name):
-        """A data set of history.h5; run: transient, cycle, settled or branch."""
+        """A data set of history.h5; run: transient, cycle or settled."""
         values = self._array("history.h5", f"{run}/{name}")
         if len(values) == 0:
             raise Missing(f"{run}: no step was made")
@@ -244,6 +245,12 @@ class Results:
         """The table of a stage in a file of its own."""
         self.stage(stage)
         return pandas().read_csv(self.folder / f"{stage}.csv")
+
+    def lines(self, stage):
+        """The lines of the same file as dicts of texts, without pandas."""
+        self.stage(stage)
+        with open(self.folder / f"{stage}.csv", newline="") as file:
+            return list(csv.DictReader(file))
 
     def sweep(self):
         """A row a mode of a point: the swept numbers, direction, track, frequency_hz, growth_rate and more."""

@@ -40,6 +40,10 @@ std::string no_mode_to_follow(const SlidingPoint& point, const Scene& scene);
 /// Whether a stage of the scene needs the modes.
 bool seeks_modes(const Scene& scene);
 
+/// Why a stage is off; empty where the scene asks for it, or the point does. `point`: as far as the stages before know
+/// it.
+std::string why_off(Stage which, const SlidingPoint& point, const Scene& scene);
+
 /// Integrates the theta steps that the scene asks for, from its start.
 Trajectory find_transient(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options);
 

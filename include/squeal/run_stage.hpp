@@ -28,10 +28,11 @@ template <class Result> Result not_run(OutcomeKind kind, const std::string& reas
   return result;
 }
 
-/// The result of the work, or why it was left out.
-template <class Work> auto run_stage(const StageRunner& run, Stage which, const Work& work)
+/// The result of the work, or why there is none. A stage that is off is not begun; `off`: why, empty where it is not.
+template <class Work> auto run_stage(const StageRunner& run, Stage which, const std::string& off, const Work& work)
 {
   decltype(work()) result;
+  if (!off.empty()) return not_run<decltype(work())>(OutcomeKind::off, off);
   const auto all = [&] { return result = work(), result.outcome.kind == OutcomeKind::interrupted; };
   const std::string left_out = run(which, all);
   if (!left_out.empty()) result = not_run<decltype(work())>(OutcomeKind::skipped, left_out);

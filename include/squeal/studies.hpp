@@ -1,5 +1,5 @@
 #pragma once
-/// The stages beyond one motion, each of which says why it does not run. All functions are collective.
+/// The stages beyond one motion that the scene asks for; each says why it does not run. All functions are collective.
 #include "squeal/find_motion.hpp"
 #include "squeal/model.hpp"
 

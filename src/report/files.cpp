@@ -5,7 +5,6 @@
 #include "squeal/base/whole_file.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace squeal
@@ -55,15 +54,6 @@ bool is_of(std::string_view pattern, std::string_view name)
   return pattern == name;
 }
 
-/// The numbers of a value: of a word its place among the words.
-Json numbers_of(const Result& result)
-{
-  if (result.value.is_array()) return result.value;
-  if (result.words.empty()) return Json::array({result.value});
-  const auto is_word = [&](const char* one) { return result.value == one; };
-  return Json::array({std::ranges::find_if(result.words, is_word) - result.words.begin()});
-}
-
 } // namespace
 
 Hdf5File::Hdf5File(fs::path place, const std::string& run, std::span<const DataSet> sets)
@@ -102,9 +92,9 @@ const DataSet& Hdf5File::set_of(const std::string& name) const
   return *found;
 }
 
-void Hdf5File::write_data(const DataSet& described, const std::string& name, const std::vector<hsize_t>& shape,
-                          hid_t type, const void* data)
+void Hdf5File::write_data(const std::string& name, const std::vector<hsize_t>& shape, hid_t type, const void* data)
 {
+  const DataSet& described = set_of(name);
   const std::string what = place_.string() + ":" + name;
   const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose, what);
   H5Pset_create_intermediate_group(links, 1);
@@ -114,32 +104,6 @@ void Hdf5File::write_data(const DataSet& described, const std::string& name, con
     throw Error("cannot write " + what + ": HDF5 refused it; is there memory for the file?");
   write_attribute(set, "unit", described.unit);
   write_attribute(set, "meaning", described.meaning);
-}
-
-void Hdf5File::write_columns(const std::string& group, const Result& list)
-{
-  for (const auto& [name, first, data_set, cells] : columns_of(list))
-  {
-    if (data_set.empty()) continue;
-    std::vector<double> reals;
-    bool is_whole = true;
-    for (const Result* cell : cells)
-      for (const Json& number : cell ? numbers_of(*cell) : Json::array({nullptr}))
-      {
-        is_whole = is_whole && !number.is_number_float();
-        reals.push_back(number.is_null() ? std::nan("") : number.get<double>());
-      }
-    std::vector<int> integers;
-    for (const double real : reals) integers.push_back(std::isfinite(real) ? static_cast<int>(real) : -1);
-    std::vector<hsize_t> shape = {cells.size()};
-    if (first->value.is_array()) shape.push_back(reals.size() / cells.size());
-    const std::string unit = column_unit(*first);
-    const DataSet set = {"", unit.c_str(), first->meaning};
-    if (is_whole)
-      write_data(set, group + "/" + data_set, shape, H5T_NATIVE_INT, integers.data());
-    else
-      write_data(set, group + "/" + data_set, shape, H5T_NATIVE_DOUBLE, reals.data());
-  }
 }
 
 std::string page_rows(std::span<const DataSet> sets)

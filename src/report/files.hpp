@@ -1,6 +1,5 @@
 #pragma once
 /// The HDF5 files of a run, each written whole or not at all: what their data sets hold, and who writes them.
-#include "result.hpp"
 #include "squeal/report/report.hpp"
 
 #include <array>
@@ -37,15 +36,13 @@ public:
   /// Writes one of the file's data sets, a row an entry. Groups of its name, "cycle/energy", are made as needed.
   template <class Value> void write(const std::string& name, const std::vector<Value>& data)
   {
-    write_data(set_of(name), name, {data.size()}, type_of<Value>(), data.data());
+    write_data(name, {data.size()}, type_of<Value>(), data.data());
   }
   /// Writes one with rows of this many entries.
   template <class Value> void write(const std::string& name, const std::vector<Value>& data, std::size_t columns)
   {
-    write_data(set_of(name), name, {data.size() / columns, columns}, type_of<Value>(), data.data());
+    write_data(name, {data.size() / columns, columns}, type_of<Value>(), data.data());
   }
-  /// Writes the columns of a list of results into a group. Where a value is not known a real is NaN, an integer -1.
-  void write_columns(const std::string& group, const Result& list);
   void keep(); // writes the file in its place
 
 private:
@@ -55,30 +52,14 @@ private:
     return std::is_same_v<Value, int> ? H5T_NATIVE_INT : H5T_NATIVE_UCHAR;
   }
   const DataSet& set_of(const std::string& name) const;
-  void write_data(const DataSet& described, const std::string& name, const std::vector<hsize_t>& shape, hid_t type,
-                  const void* data);
+  void write_data(const std::string& name, const std::vector<hsize_t>& shape, hid_t type, const void* data);
 
   std::filesystem::path place_;
   std::span<const DataSet> sets_;
   hid_t id_ = -1;
 };
 
-/// A list of report.json that history.h5 has the columns of.
-struct ResultColumns
-{
-  const char* group; // in the file
-  const char* stage;
-  const char* list; // of the stage
-};
-
-/// The group of the random samples.
-inline constexpr const char* sample_group = "robustness";
-
-inline constexpr std::array result_columns = {ResultColumns{"branch", "branch", "points"},
-                                              ResultColumns{"branch/equilibrium", "branch", "equilibria"},
-                                              ResultColumns{"sweep", "sweep", "points"}};
-
-/// Data sets of history.h5 beside columns.
+/// Data sets of history.h5.
 inline constexpr std::array history_sets = {
     DataSet{"<run>/time", "s", "ends of steps of `transient`, `cycle` or `settled`; powers are means over a step"},
     DataSet{"<run>/energy", "J", "mechanical energy"},
@@ -98,13 +79,8 @@ inline constexpr std::array history_sets = {
             "samples in rows: the velocity's factors of shapes of `fields.h5`"},
     DataSet{"settled/spectrum/frequency", "Hz", "of the probe that swings most, under a Hann window"},
     DataSet{"settled/spectrum/amplitude", "m, or N without probes", "amplitude there"},
-    DataSet{"settled/spectrum/line_frequency", "Hz", "its lines, the strongest first, refined between the points"},
-    DataSet{"settled/spectrum/line_amplitude", "m, or N without probes", "their amplitudes"},
     DataSet{"response/frequency", "Hz", "frequencies"},
     DataSet{"response/receptance/<excitation>/<probe>", "m/N", "real and imaginary part of displacement over force"},
-    DataSet{"sweep/frequency", "Hz", "frequency of each followed mode, one a column; NaN where it was not found"},
-    DataSet{"sweep/growth_rate", "1/s", "its growth rate"},
-    DataSet{"sweep/mac", "-", "its MAC with the point before"},
 };
 
 /// Data sets of fields.h5.

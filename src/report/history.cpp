@@ -1,9 +1,7 @@
-/// history.h5: histories of transient, cycle and settled motion against time, responses, and columns of results.
+/// history.h5: histories of transient, cycle and settled motion against time, and responses.
 #include "files.hpp"
-#include "results.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace squeal
 {
@@ -18,21 +16,6 @@ void write_group(Hdf5File& file, const std::string& group, const History& histor
   for_each_series(write, history);
   const std::size_t probes = std::min(scene.probes.size(), history.probes.size());
   for (std::size_t i = 0; i < probes; ++i) write("probes/" + scene.probes[i].name, "m", history.probes[i]);
-}
-
-/// The spectrum of a settled motion, and its lines, strongest first.
-void write_spectrum(Hdf5File& file, const Spectrum& spectrum)
-{
-  std::vector<double> frequency, amplitude;
-  for (const Line& line : spectrum.lines)
-  {
-    frequency.push_back(line.frequency_hz);
-    amplitude.push_back(line.amplitude);
-  }
-  file.write("settled/spectrum/frequency", spectrum.frequency_hz);
-  file.write("settled/spectrum/amplitude", spectrum.amplitude);
-  file.write("settled/spectrum/line_frequency", frequency);
-  file.write("settled/spectrum/line_amplitude", amplitude);
 }
 
 /// The motion on its shapes, one sample a row.
@@ -74,26 +57,6 @@ void write_response(Hdf5File& file, const Response& response, const Scene& scene
     }
 }
 
-/// Followed modes, points in rows and modes in columns; NaN where one was not found.
-void write_tracks(Hdf5File& file, const Sweep& sweep)
-{
-  const std::size_t points = sweep.points.size(), tracks = static_cast<std::size_t>(sweep.tracks);
-  std::vector<double> frequency(points * tracks, std::nan("")), growth = frequency, mac = frequency;
-  for (std::size_t i = 0; i < points; ++i)
-    for (const SweptMode& mode : sweep.points[i].modes)
-    {
-      if (mode.track < 0) continue;
-      const std::size_t place = i * tracks + static_cast<std::size_t>(mode.track);
-      frequency[place] = frequency_hz_of(mode.lambda);
-      growth[place] = mode.lambda.real();
-      mac[place] = mode.mac;
-    }
-  if (frequency.empty()) return;
-  file.write("sweep/frequency", frequency, tracks);
-  file.write("sweep/growth_rate", growth, tracks);
-  file.write("sweep/mac", mac, tracks);
-}
-
 } // namespace
 
 void write_history(const Report& report, const Scene& scene, const std::filesystem::path& place)
@@ -109,15 +72,11 @@ void write_history(const Report& report, const Scene& scene, const std::filesyst
   if (has_run(settled.outcome))
   {
     write_group(file, "settled", settled.history, scene);
-    write_spectrum(file, settled.examined.spectrum);
+    file.write("settled/spectrum/frequency", settled.examined.spectrum.frequency_hz);
+    file.write("settled/spectrum/amplitude", settled.examined.spectrum.amplitude);
     if (!scene.matrices) write_coordinates(file, settled);
   }
   if (has_run(report.response.outcome)) write_response(file, report.response, scene);
-  if (has_run(report.sweep.outcome)) write_tracks(file, report.sweep);
-  const Result results = results_of(report, scene);
-  for (const auto& [group, stage, name] : result_columns)
-    if (const Result* list = results.part(stage)->part(name)) file.write_columns(group, *list);
-  file.write_columns(sample_group, robustness_samples(report.robustness, scene, Content::results));
   file.keep();
 }
 

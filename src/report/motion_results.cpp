@@ -2,7 +2,6 @@
 #include "results.hpp"
 
 #include <algorithm>
-#include <array>
 
 namespace squeal
 {

@@ -11,20 +11,16 @@ namespace squeal
 namespace
 {
 
-/// Adds the values of a group, which is in groups of the names `place` and `data_place`, to the columns that they
-/// belong to.
-void add_cells(const Result& group, const std::string& place, const std::string& data_place, std::size_t row,
-               std::vector<Column>& columns)
+/// Adds the values of a group, which is in groups of the names `place`, to the columns that they belong to.
+void add_cells(const Result& group, const std::string& place, std::size_t row, std::vector<Column>& columns)
 {
   for (const Result& part : group.parts)
   {
     const std::string name = place + part.name;
-    if (part.kind == Result::Kind::group)
-      add_cells(part, name + " ", part.data_set.empty() ? data_place : data_place + part.data_set + "/", row, columns);
+    if (part.kind == Result::Kind::group) add_cells(part, name + " ", row, columns);
     if (part.kind != Result::Kind::value) continue;
     auto column = std::ranges::find(columns, name, &Column::name);
-    if (column == columns.end())
-      column = columns.insert(column, {name, &part, part.data_set.empty() ? "" : data_place + part.data_set, {}});
+    if (column == columns.end()) column = columns.insert(column, {name, &part, {}});
     column->cells.resize(row);
     column->cells.push_back(&part);
   }
@@ -118,11 +114,9 @@ Entry Entry::list(const std::string& name) const
   return entry;
 }
 
-Entry Entry::group(const std::string& name, const std::string& data_set) const
+Entry Entry::group(const std::string& name) const
 {
-  Result& result = at_.parts.emplace_back(Result{Result::Kind::group, name});
-  result.data_set = data_set;
-  Entry entry(result, scene_, content_);
+  Entry entry(at_.parts.emplace_back(Result{Result::Kind::group, name}), scene_, content_);
   entry.shown_ = shown_;
   return entry;
 }
@@ -142,7 +136,7 @@ Json json_of(const Result& result)
 std::vector<Column> columns_of(const Result& list)
 {
   std::vector<Column> columns;
-  for (std::size_t row = 0; const Result& group : list.parts) add_cells(group, "", "", row++, columns);
+  for (std::size_t row = 0; const Result& group : list.parts) add_cells(group, "", row++, columns);
   for (Column& column : columns) column.cells.resize(list.parts.size());
   return columns;
 }
@@ -161,27 +155,10 @@ std::string csv_of(const Result& list)
   return text;
 }
 
-std::string column_unit(const Result& result)
-{
-  std::string unit;
-  for (std::size_t i = 0; i < result.words.size(); ++i)
-    if (*result.words[i]) unit += format("%s%zu %s", unit.empty() ? "" : ", ", i, result.words[i]);
-  return unit.empty() ? result.unit : unit;
-}
-
 std::string page_rows(const Result& result)
 {
   std::string rows;
   for (const Result& part : result.parts) add_page_rows(part, "", rows);
-  return rows;
-}
-
-std::string page_rows_of_columns(const Result& list, const std::string& group)
-{
-  std::string rows;
-  for (const auto& [name, first, data_set, cells] : columns_of(list))
-    if (!data_set.empty())
-      rows += markdown_row({markdown_code(group + "/" + data_set), column_unit(*first), first->meaning});
   return rows;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 /// A result with its name, unit, meaning and value. A tree of results is what report.json, the printed table, CSV
-/// files, columns of history.h5 and the page inputs/RESULTS.md are written from.
+/// files and the page inputs/RESULTS.md are written from.
 #include "squeal/base/words.hpp"
 #include "squeal/scene/scene.hpp"
 #include "squeal/settled/statistics.hpp"
@@ -39,12 +39,8 @@ struct Result
   const char* meaning = "";
   Json value{};
   std::list<Result> parts{};
-  Words words{};          // of which the value is one
-  std::string data_set{}; // its name as a column of an HDF5 file; empty: it has none
+  Words words{}; // of which the value is one
   Place place = Place::none;
-
-  /// Makes it a column of the HDF5 group that its list is written to.
-  void column(std::string as) { data_set = std::move(as); }
 
   /// The part of this name; null: there is none.
   const Result* part(const std::string& of) const;
@@ -102,10 +98,7 @@ public:
   /// A mean with its error bar.
   void mean(const std::string& name, const std::string& unit, const char* meaning, const MeanValue& value) const;
 
-  Entry group(const std::string& name) const { return group(name, ""); }
-
-  /// A group whose columns are below this name in an HDF5 file.
-  Entry group(const std::string& name, const std::string& data_set) const;
+  Entry group(const std::string& name) const;
 
   /// An empty list, to which groups without a name are added.
   Entry list(const std::string& name) const;
@@ -140,7 +133,6 @@ struct Column
 {
   std::string name; // behind the names of the groups that it stands in
   const Result* first = nullptr;
-  std::string data_set; // with the groups that it stands in
   std::vector<const Result*> cells;
 };
 
@@ -150,13 +142,7 @@ std::vector<Column> columns_of(const Result& list);
 /// A list as CSV: a head, and a line a group. What is not known is empty.
 std::string csv_of(const Result& list);
 
-/// Unit of a column in an HDF5 file: of a word its places.
-std::string column_unit(const Result& result);
-
 /// Rows of the page: name, unit and meaning of each value.
 std::string page_rows(const Result& result);
-
-/// Rows of the page for the columns of a list in an HDF5 group.
-std::string page_rows_of_columns(const Result& list, const std::string& group);
 
 } // namespace squeal

@@ -148,9 +148,6 @@ std::string result_page()
   const Report none;
   const Result results = filled(none, scene, Content::example), modes = sweep_modes({}, scene, Content::example),
                samples = robustness_samples({}, scene, Content::example);
-  std::string columns;
-  for (const auto& [group, stage, list] : result_columns)
-    columns += page_rows_of_columns(*results.part(stage)->part(list), group);
   return "# Results of a run\n\nsqueal writes this page: `squeal --reference results`. [RUNS.md](RUNS.md) says which "
          "files a run leaves, how to\njudge their numbers, and how an ended run goes on.\n\n`<name>` stands for any "
          "name of its kind, `[]` for the entries of a list. A number that does not exist is `null`. A stage\nthat "
@@ -159,8 +156,7 @@ std::string result_page()
          section("report.json", page_rows(results)) + section("sweep.csv", page_rows(modes)) +
          section("robustness.csv", page_rows(samples)) +
          "\n`sweep_motions.csv` has a line for each `sweep.points[].motion`, with its results.\n" +
-         section("history.h5", page_rows(history_sets) + columns + page_rows_of_columns(samples, sample_group)) +
-         section("fields.h5", page_rows(field_sets));
+         section("history.h5", page_rows(history_sets)) + section("fields.h5", page_rows(field_sets));
 }
 
 } // namespace squeal

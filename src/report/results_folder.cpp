@@ -3,7 +3,6 @@
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/petsc.hpp"
-#include "squeal/base/whole_file.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 
 #include <algorithm>
@@ -147,13 +146,6 @@ std::string ResultsFolder::keep_finished()
                : "";
 }
 
-fs::path ResultsFolder::meanwhile(const fs::path& file) const
-{
-  if (file.empty()) return file;
-  const fs::path inside = resolved(file).lexically_relative(place_);
-  return inside.empty() || *inside.begin() == ".." || inside.has_parent_path() ? file : partial_ / inside;
-}
-
 /// Goes on where a run that was killed meanwhile had come: the earlier report goes before any result is moved, the new
 /// one comes last.
 void ResultsFolder::move_finished()
@@ -198,13 +190,6 @@ void ResultsFolder::publish(Checkpoints checkpoints)
                  }
                });
   published_ = true;
-}
-
-bool is_used_meanwhile(const fs::path& file, const fs::path& place)
-{
-  const fs::path name = file.filename();
-  return file.parent_path() == place && (name == lock_file || name == partial_folder || name == finished_folder ||
-                                         name.extension() == unfinished_ending);
 }
 
 bool is_same_file(const fs::path& a, const fs::path& b)

@@ -94,10 +94,10 @@ void warn_of_modes(Entry out, const Modes& modes, const ModelSummary& model)
 
 void add_probes(Entry out, const std::string& name, const char* meaning, const std::vector<double>& values)
 {
-  const Entry probes = out.group(name, "probes");
+  const Entry probes = out.group(name);
   for (std::size_t i = 0; i < std::min(out.scene().probes.size(), values.size()); ++i)
-    probes.show(out.scene().probes[i].name, "m", meaning, values[i]).column(out.scene().probes[i].name);
-  if (probes.is_example()) probes.add("<probe>", "m", meaning, 0.).column("<probe>");
+    probes.show(out.scene().probes[i].name, "m", meaning, values[i]);
+  if (probes.is_example()) probes.add("<probe>", "m", meaning, 0.);
 }
 
 void add_equilibrium(Entry whole, const Report& report)

@@ -53,22 +53,20 @@ void add_branch_point(Entry out, const BranchPoint& point)
   const PointMeasures& measures = point.measures;
   const auto& values = point.multipliers.values;
   const double largest = values.empty() ? std::nan("") : std::abs(values.front());
-  out.show("parameter", "unit of the key", "value of the number", point.parameter).column("parameter");
+  out.show("parameter", "unit of the key", "value of the number", point.parameter);
   out.add("period", "s", "period of the cycle", point.period);
-  out.show("frequency_hz", "Hz", "its frequency", 1 / point.period).column("frequency");
+  out.show("frequency_hz", "Hz", "its frequency", 1 / point.period);
   out.add("residual", "-", "in the full space: up to ten tolerances where the period's map jumps", point.residual);
   if (out.has(!std::isnan(point.full_residual)))
     out.add("full_residual", "-", "what a period of the full model misses a reduced cycle by", point.full_residual);
-  out.add("mean_energy", "J", "mean mechanical energy", measures.mean_energy).column("mean_energy");
-  out.show("mean_fluctuating_energy", "J", "mean energy about equilibrium", measures.mean_fluctuating_energy)
-      .column("mean_fluctuating_energy");
+  out.add("mean_energy", "J", "mean mechanical energy", measures.mean_energy);
+  out.show("mean_fluctuating_energy", "J", "mean energy about equilibrium", measures.mean_fluctuating_energy);
   out.add("open_pairs_mean", "-", "mean number of open pairs", measures.open_pairs_mean);
-  out.add("open_steps", "-", "steps at which a pair is open that also closes", measures.open_steps)
-      .column("open_steps");
+  out.add("open_steps", "-", "steps at which a pair is open that also closes", measures.open_steps);
   out.add("lift_offs", "-", "times that such a pair opens", measures.lift_offs);
-  out.add("stick_steps", "-", "steps at which a pair sticks, of all pairs", measures.stick_steps).column("stick_steps");
-  out.show("largest_multiplier", "-", "modulus of its largest multiplier", largest).column("largest_multiplier");
-  out.show("stability", "verdict on the cycle", point.multipliers.stability).column("stability");
+  out.add("stick_steps", "-", "steps at which a pair sticks, of all pairs", measures.stick_steps);
+  out.show("largest_multiplier", "-", "modulus of its largest multiplier", largest);
+  out.show("stability", "verdict on the cycle", point.multipliers.stability);
   add_multipliers(out, "multipliers", point.multipliers);
   add_probes(out.hidden(), "peak_to_peak", "swing of the probe", measures.peak_to_peak);
 }
@@ -85,10 +83,10 @@ void add_event(Entry out, const BranchEvent& event)
 
 void add_equilibrium_point(Entry out, const EquilibriumStability& equilibrium)
 {
-  out.add("parameter", "unit of the key", "value of the number", equilibrium.parameter).column("parameter");
+  out.add("parameter", "unit of the key", "value of the number", equilibrium.parameter);
   out.add("unstable_modes", "-", "unstable modes of the equilibrium", equilibrium.unstable_modes);
-  out.add("growth_rate", "1/s", "growth rate of its least stable mode", equilibrium.growth_rate).column("growth_rate");
-  out.add("frequency_hz", "Hz", "frequency of that mode", equilibrium.frequency_hz).column("frequency");
+  out.add("growth_rate", "1/s", "growth rate of its least stable mode", equilibrium.growth_rate);
+  out.add("frequency_hz", "Hz", "frequency of that mode", equilibrium.frequency_hz);
 }
 
 void add_range(Entry out, const ParameterRange& range)

@@ -47,8 +47,8 @@ std::vector<Track> unstable_tracks(const Sweep& sweep)
 /// Where a point, a threshold or a track is.
 void add_place(Entry out, const char* meaning, const SweptPlace& place)
 {
-  out.show("values", "units of the keys", meaning, place.values).column("value");
-  out.show("direction", "-", "1: rotation as in the scene, -1: reversed", place.reversed ? -1 : 1).column("direction");
+  out.show("values", "units of the keys", meaning, place.values);
+  out.show("direction", "-", "1: rotation as in the scene, -1: reversed", place.reversed ? -1 : 1);
 }
 
 /// Where a line of a table is: a value of each number.
@@ -62,18 +62,17 @@ void add_line_place(Entry out, const SweptPlace& place)
 
 void add_motion(Entry out, const SweptMotion& motion)
 {
-  const char *const fluctuating = "mean_fluctuating_energy", *const estimated = "estimated_amplitude";
   out.add("outcome", "word", "outcome of the search; `settled`: the settled motion answers", word(motion.outcome.kind));
   out.text("reason", "why it failed, or what is undecided", motion.outcome.reason);
-  out.add("kind", "kind of what attracts", motion.kind).column("kind");
-  out.add("stability", "verdict on the cycle, if one was examined", motion.stability).column("stability");
-  out.add("frequency_hz", "Hz", "of the cycle, or of the strongest line", motion.frequency_hz).column("frequency_hz");
-  out.add(fluctuating, "J", "mean energy about equilibrium", motion.energy.value).column(fluctuating);
-  out.add("energy_error", "J", "of a settled motion: its error", motion.energy.error).column("energy_error");
-  out.add("largest_multiplier", "-", "modulus of the cycle's", motion.multiplier).column("largest_multiplier");
-  out.add("multiplier_error", "-", "its error bar", motion.multiplier_error).column("multiplier_error");
-  out.add(estimated, "m", "amplitude by the energy estimate", motion.estimate).column(estimated);
-  out.add("residual", "-", "full-space residual of the cycle", motion.residual).column("residual");
+  out.add("kind", "kind of what attracts", motion.kind);
+  out.add("stability", "verdict on the cycle, if one was examined", motion.stability);
+  out.add("frequency_hz", "Hz", "of the cycle, or of the strongest line", motion.frequency_hz);
+  out.add("mean_fluctuating_energy", "J", "mean energy about equilibrium", motion.energy.value);
+  out.add("energy_error", "J", "of a settled motion: its error", motion.energy.error);
+  out.add("largest_multiplier", "-", "modulus of the cycle's", motion.multiplier);
+  out.add("multiplier_error", "-", "its error bar", motion.multiplier_error);
+  out.add("estimated_amplitude", "m", "amplitude by the energy estimate", motion.estimate);
+  out.add("residual", "-", "full-space residual of the cycle", motion.residual);
   add_probes(out.hidden(), "peak_to_peak", "swing of the probe within a period", motion.peak_to_peak);
   out.add("steps_per_period", "-", "time steps a period", motion.steps_per_period);
   out.add("periods_integrated", "-", "periods that were integrated", motion.periods);
@@ -86,16 +85,15 @@ void add_point(Entry out, const SweepPoint& point)
   out.add("outcome", "word", "`converged`, or how the point failed", word(point.outcome.kind));
   out.text("reason", "why it failed", point.outcome.reason);
   out.add("inserted", "switch", "between the scene's points, where pairs or modes change much", point.inserted);
-  out.add("closed", "-", "closed pairs", point.closed).column("closed");
-  out.show("unstable_modes", "-", "unstable modes in the band", point.unstable).column("unstable_modes");
+  out.add("closed", "-", "closed pairs", point.closed);
+  out.show("unstable_modes", "-", "unstable modes in the band", point.unstable);
   if (out.has(!point.modes.empty()))
   {
     const std::complex<double> lambda = point.modes.empty() ? 0 : point.modes.front().lambda;
     out.show("growth_rate", "1/s", "growth rate of the least stable mode", lambda.real());
     out.show("frequency_hz", "Hz", "frequency of that mode", frequency_hz_of(lambda));
   }
-  if (out.has(point.motion.has_value()))
-    add_motion(out.group("motion", "motion"), point.motion.value_or(SweptMotion{}));
+  if (out.has(point.motion.has_value())) add_motion(out.group("motion"), point.motion.value_or(SweptMotion{}));
 }
 
 void add_track(Entry out, const Track& track)
@@ -194,13 +192,12 @@ void add_random_sample(Entry out, const RobustSample& sample)
   for (std::size_t i = 0; i < sample.values.size(); ++i)
     out.add(out.scene().uncertain[i].key, "unit of the key", "value of the random number", sample.values[i]);
   if (out.is_example()) out.add("<key>", "unit of the key", "value of each random number", 0);
-  out.add("values", "units of the keys", "values of the random numbers", sample.values).column("value");
-  out.add("known", "-", "1: there is an equilibrium", sample.known ? 1 : 0).column("known");
-  out.add("closed_pairs", "-", "closed pairs", sample.closed).column("closed");
-  out.add("unstable_modes", "-", "unstable modes in the band", sample.unstable).column("unstable_modes");
-  out.add("growth_rate", "1/s", "greatest growth rate over abs(lambda)", sample.growth_rate).column("growth_rate");
-  out.add("frequency_hz", "Hz", "frequency of that mode", sample.frequency_hz).column("frequency");
-  out.add("mode", "-", "its number in `robustness.modes[]` if it is unstable; -1: none", sample.mode).column("mode");
+  out.add("known", "-", "1: there is an equilibrium", sample.known ? 1 : 0);
+  out.add("closed_pairs", "-", "closed pairs", sample.closed);
+  out.add("unstable_modes", "-", "unstable modes in the band", sample.unstable);
+  out.add("growth_rate", "1/s", "greatest growth rate over abs(lambda)", sample.growth_rate);
+  out.add("frequency_hz", "Hz", "frequency of that mode", sample.frequency_hz);
+  out.add("mode", "-", "its number in `robustness.modes[]` if it is unstable; -1: none", sample.mode);
 }
 
 } // namespace

@@ -6,15 +6,12 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 
 namespace squeal
 {
 
 namespace
 {
-
-constexpr const char *a_number = "a number", *a_list = "a list";
 
 using WordsLeft = std::span<const std::string>;
 
@@ -49,15 +46,6 @@ std::span<double> numbers_of(const Target& target, WordsLeft& words)
   return (**vectors)[*place];
 }
 
-std::string kind_of_target(const Target& target)
-{
-  if (std::holds_alternative<bool*>(target)) return "true or false";
-  const bool is_list = std::holds_alternative<Vec3*>(target) || std::holds_alternative<std::optional<Vec3>*>(target) ||
-                       std::holds_alternative<std::array<double, 6>*>(target) ||
-                       std::holds_alternative<std::vector<Vec3>*>(target);
-  return is_list ? a_list : "text";
-}
-
 FoundValue find_among(const SceneKeys& keys, const std::string& label, WordsLeft words);
 
 /// The value in a table, of which the first word selects an entry if it is a list.
@@ -65,7 +53,7 @@ FoundValue find_in_table(const SceneKey& key, const std::string& label, WordsLef
 {
   const auto& table = std::get<TableTarget>(key.target);
   if (table.form != TableForm::list) return find_among(table.entry(0).keys, label_of(key, "", label), words);
-  if (words.empty()) return {a_list};
+  if (words.empty()) return {true};
   const std::string& selector = words.front();
   for (std::size_t i = 0; i < table.size(); ++i)
     if (const TableEntry entry = table.entry(i); entry.name == selector)
@@ -81,7 +69,7 @@ FoundValue find_in_table(const SceneKey& key, const std::string& label, WordsLef
 /// The value among these keys that the words lead to.
 FoundValue find_among(const SceneKeys& keys, const std::string& label, WordsLeft words)
 {
-  if (words.empty()) return {"a table"};
+  if (words.empty()) return {true};
   const auto key = std::ranges::find(keys, words.front(), &SceneKey::name);
   if (key == keys.end() || is_absent(*key)) return {};
   words = words.subspan(1);
@@ -89,31 +77,17 @@ FoundValue find_among(const SceneKeys& keys, const std::string& label, WordsLeft
   if (std::holds_alternative<TableTarget>(key->target))
     found = find_in_table(*key, label, words);
   else if (double* const number = number_of(key->target); number && words.empty())
-    found = {a_number, number, {}, *key, label};
+    found = {true, number, {}, *key, label};
   else if (const std::span<double> entries = numbers_of(key->target, words); words.size() == 1)
   {
     if (const auto place = place_in(entries.size(), words.front()))
-      found = {a_number, &entries[*place], entries, *key, label};
+      found = {true, &entries[*place], entries, *key, label};
   }
-  else if (words.empty())
-    found.kind = kind_of_target(key->target);
+  else
+    found.is_there = words.empty();
   if (found.effect == Effect::nothing) found.effect = key->effect;
   if (found.unit == "-" && has_unit(key->unit)) found.unit = key->unit;
   return found;
-}
-
-/// Makes a direction a unit vector. Throws Error for an entry of a list that its key does not allow.
-void finish_list(const FoundValue& number, const std::string& place)
-{
-  const std::span<double> entries = number.entries;
-  const auto fail = [&](const std::string& expected)
-  { refuse_value(number.key, place, text_of_number(*number.number), expected); };
-  if (entries.size() == 6 && std::min({entries[0], entries[1], entries[2]}) < 0) fail("no negative xx, yy or zz");
-  if (number.key.rule != Rule::direction) return;
-  const double length = std::hypot(entries[0], entries[1], entries[2]);
-  if (length == 0) fail("a direction, not the zero vector");
-  if (std::abs(length - 1) > 1e-15) // a unit vector keeps its digits
-    for (double& x : entries) x /= length;
 }
 
 } // namespace
@@ -179,11 +153,11 @@ Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers)
     const FoundValue number = find_value(changed, key);
     if (!number.number) throw Error(given + ": the scene has no such number");
     const std::string place = given + ": " + number.label;
-    const Rule rule = number.entries.empty() ? number.key.rule : Rule::any;
-    if (const std::string problem = problem_of_number(rule, value); !problem.empty())
-      refuse_value(number.key, place, text_of_number(value), problem);
+    const bool is_listed = !number.entries.empty();
+    std::string problem = problem_of_number(is_listed ? Rule::any : number.key.rule, value);
     *number.number = value;
-    if (!number.entries.empty()) finish_list(number, place);
+    if (problem.empty() && is_listed) problem = problem_of_list(number.key.rule, number.entries);
+    if (!problem.empty()) refuse_value(number.key, place, text_of_number(value), problem);
     places.given[number.number] = given;
   }
   check_scene(changed, places);

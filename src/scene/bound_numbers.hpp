@@ -8,7 +8,7 @@ namespace squeal
 /// A value that a key leads to in a scene.
 struct FoundValue
 {
-  std::string kind{};          // "a number", "text", "a list" and so on; empty: the scene has no such value
+  bool is_there = false;
   double* number = nullptr;    // null: it is none
   std::span<double> entries{}; // of the list that the number is in; empty: it is a value of its own
   SceneKey key{};

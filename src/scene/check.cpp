@@ -17,18 +17,14 @@ namespace
 class Checker
 {
 public:
-  Checker(const Scene& scene, const Places& places) : scene_(scene), places_(places)
-  {
-    for (const Point& point : scene.points) points_.push_back(point.name);
-    nodes_ = points_;
-    for (const RigidBody& body : scene.rigid_bodies) nodes_.push_back(body.name);
-  }
+  Checker(const Scene& scene, const Places& places) : scene_(scene), places_(places), points_(names_of(scene.points)) {}
 
   void check_all() const
   {
     check_source();
     check_names();
-    check_motions();
+    for (const Support& support : scene_.supports)
+      if (support.fixed == Motions{}) fail(&support.fixed, "[[support]] " + support.on + " fixed holds nothing still");
     for (const Part& part : scene_.parts) check_material(part);
     for (const Spring& spring : scene_.springs) check_spring(spring);
     if (!scene_.mesh && !scene_.matrices)
@@ -147,12 +143,6 @@ private:
       fail(member, key + " = \"" + name + "\" is not defined" + hint_or_list(name, known));
   }
 
-  void check_motions() const
-  {
-    for (const Support& support : scene_.supports)
-      if (support.fixed == Motions{}) fail(&support.fixed, "[[support]] " + support.on + " fixed holds nothing still");
-  }
-
   void check_material(const Part& part) const
   {
     const Material& material = part.material;
@@ -195,7 +185,8 @@ private:
 
   void check_spring(const Spring& spring) const
   {
-    std::vector<std::string> ends = nodes_;
+    std::vector<std::string> ends = points_;
+    std::ranges::copy(names_of(scene_.rigid_bodies), std::back_inserter(ends));
     ends.push_back(ground);
     need_known(spring.from, ends, &spring.from, "[[spring]] from");
     need_known(spring.to, ends, &spring.to, "[[spring]] to");
@@ -205,10 +196,7 @@ private:
       fail(&spring.from, "[[spring]] " + spring.from + " has neither stiffness nor damping");
   }
 
-  bool is_point(const std::string& name) const
-  {
-    return std::find(points_.begin(), points_.end(), name) != points_.end();
-  }
+  bool is_point(const std::string& name) const { return std::ranges::find(points_, name) != points_.end(); }
 
   void check_contact(const Contact& contact) const
   {
@@ -419,15 +407,12 @@ private:
   void check_response(const ResponseSettings& r) const
   {
     constexpr int most = 100000; // frequencies: ten times what a rig's analyser takes
-    std::vector<std::string> probes;
-    for (const Probe& probe : scene_.probes) probes.push_back(probe.name);
+    const std::vector<std::string> probes = names_of(scene_.probes);
     if (probes.empty()) fail(&r, "[response] needs a [[probe]] where the structure is driven and read");
-    for (std::size_t i = 0; i < r.excitation.size(); ++i)
+    for (const std::string& name : r.excitation)
     {
-      const std::string& name = r.excitation[i];
       need_known(name, probes, &r.excitation, "[response] excitation");
-      if (std::find(r.excitation.begin(), r.excitation.begin() + static_cast<long>(i), name) !=
-          r.excitation.begin() + static_cast<long>(i))
+      if (std::ranges::count(r.excitation, name) > 1)
         fail(&r.excitation, "[response] excitation names \"" + name + "\" twice; keep one");
     }
     if (r.count < 2 || r.count > most)
@@ -440,8 +425,7 @@ private:
 
   const Scene& scene_;
   const Places& places_;
-  std::vector<std::string> points_; // names of points
-  std::vector<std::string> nodes_;  // names of points and rigid bodies
+  std::vector<std::string> points_; // their names
 };
 
 } // namespace

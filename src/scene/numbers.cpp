@@ -53,10 +53,9 @@ double number_at(const Scene& scene, const std::string& key, const std::string& 
                   ", such as " + friction_coefficient_key);
   Scene copy = scene; // keys bind members that can be written
   const FoundValue found = find_value(copy, key);
-  if (found.kind.empty())
+  if (!found.is_there)
     throw refusal(std::string("is not in the scene: name a number as --set does, such as ") + friction_coefficient_key);
-  if (!found.number)
-    throw refusal("is " + found.kind + ", not a number; of a list name an entry, such as force.0.vector.2");
+  if (!found.number) throw refusal("is not a number; of a list name an entry, such as force.0.vector.2");
   return *found.number;
 }
 
@@ -269,13 +268,12 @@ namespace
 void check_numbers(const Scene& scene)
 {
   const std::vector<SceneNumber> numbers = sensitive_numbers(scene);
-  for (std::size_t i = 0; i < numbers.size(); ++i)
+  for (const auto& [key, value] : numbers)
   {
-    const std::string& key = numbers[i].key;
-    if (std::ranges::count(std::span(numbers).first(i), key, &SceneNumber::key) > 0)
+    if (std::ranges::count(numbers, key, &SceneNumber::key) > 1)
       throw Error("[sensitivity] numbers names \"" + key + "\" twice: take one of them out");
     constexpr double little = 1e-9; // beside any number of use
-    if (numbers[i].value == 0)
+    if (value == 0)
       prefixed("[sensitivity] " + key + " is 0, and nothing beside that is a scene: leave it out, or give it a value. ",
                [&] {
                  (void)scene_with(scene, from_zero(scene, {key, little}));
@@ -288,8 +286,7 @@ void check_numbers(const Scene& scene)
 void check_sensitivity(const Scene& scene, const Places& places)
 {
   if (scene.sensitivity) prefixed(places.at(&scene.sensitivity->numbers) + ": ", [&] { check_numbers(scene); });
-  std::vector<std::string> probes;
-  for (const Probe& probe : scene.probes) probes.push_back(probe.name);
+  const std::vector<std::string> probes = names_of(scene.probes);
   for (const Change& change : scene.changes)
   {
     if (!scene.sensitivity)

@@ -156,9 +156,9 @@ public:
   {
     const auto values = numbers(node, "a list of three or six numbers");
     if (values.size() != 3 && values.size() != 6) fail(node, "a list of three or six numbers");
-    if (std::min({values[0], values[1], values[2]}) < 0) fail(node, "no negative xx, yy or zz");
     target.fill(0);
     std::copy(values.begin(), values.end(), target.begin());
+    need_allowed(node, target);
   }
 
   void read(const toml::node& node, Motions& target) const
@@ -283,12 +283,13 @@ private:
     const auto values = numbers(node, "a list of three numbers");
     if (values.size() != 3) fail(node, "a list of three numbers, not of " + std::to_string(values.size()));
     std::copy(values.begin(), values.end(), v.begin());
-    if (value_.key.rule != Rule::direction) return v;
-    const double length = std::hypot(v[0], v[1], v[2]);
-    if (length == 0) fail(node, "a direction, not the zero vector");
-    if (std::abs(length - 1) > 1e-15) // a unit vector keeps its digits
-      for (double& x : v) x /= length;
+    need_allowed(node, v);
     return v;
+  }
+
+  void need_allowed(const toml::node& node, std::span<double> entries) const
+  {
+    if (const std::string problem = problem_of_list(value_.key.rule, entries); !problem.empty()) fail(node, problem);
   }
 
   std::filesystem::path absolute(const std::string& text) const
@@ -411,6 +412,17 @@ std::string problem_of_number(Rule rule, double value)
       bounds.open ? value > bounds.least && value < bounds.greatest : value >= bounds.least && value <= bounds.greatest;
   if (!inside || !std::isfinite(value)) return bounds.text;
   return std::abs(value) > largest_number ? "a number of at most 1e100 in size, so that powers of it are finite" : "";
+}
+
+std::string problem_of_list(Rule rule, std::span<double> entries)
+{
+  if (entries.size() == 6 && std::min({entries[0], entries[1], entries[2]}) < 0) return "no negative xx, yy or zz";
+  if (rule != Rule::direction) return {};
+  const double length = std::hypot(entries[0], entries[1], entries[2]);
+  if (length == 0) return "a direction, not the zero vector";
+  if (std::abs(length - 1) > 1e-15) // a unit vector keeps its digits
+    for (double& x : entries) x /= length;
+  return {};
 }
 
 void refuse_value(const SceneKey& key, const std::string& place, const std::string& text, const std::string& expected)

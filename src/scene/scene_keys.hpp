@@ -150,6 +150,14 @@ struct Places
   std::string at(const void* member) const;
 };
 
+/// The names of a list's entries.
+template <class Entry> std::vector<std::string> names_of(const std::vector<Entry>& list)
+{
+  std::vector<std::string> names;
+  for (const Entry& entry : list) names.push_back(entry.name);
+  return names;
+}
+
 /// Throws Error on contradictions between keys: undefined or repeated names, tables that exclude each other.
 void check_scene(const Scene& scene, const Places& places);
 

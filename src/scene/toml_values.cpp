@@ -1,9 +1,9 @@
 /// Values of TOML documents, and overrides from the command line: --set table.key=value.
 #include "toml_values.hpp"
 
+#include "bound_numbers.hpp"
 #include "squeal/base/error.hpp"
 
-#include <charconv>
 #include <cmath>
 #include <sstream>
 
@@ -145,11 +145,7 @@ std::string kind_of(const toml::node& node)
 std::string text_of(const toml::node& node)
 {
   if (node.is_array() || node.is_table()) return kind_of(node);
-  if (const auto number = node.value_exact<double>(); number && std::isfinite(*number))
-  {
-    char digits[32]; // the shortest text of the number: -0.3, not -0.29999999999999999
-    return {digits, std::to_chars(digits, digits + sizeof digits, *number).ptr};
-  }
+  if (const auto number = node.value_exact<double>(); number && std::isfinite(*number)) return text_of_number(*number);
   std::ostringstream text;
   text << toml::node_view<const toml::node>(node);
   return text.str();

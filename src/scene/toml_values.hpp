@@ -37,6 +37,9 @@ std::vector<std::string> words_of_key(const std::string& key);
 /// The values that a rule wants instead of one; empty: the rule allows it.
 std::string problem_of_number(Rule rule, double value);
 
+/// The entries that a key wants instead of these; empty: it allows them. A direction becomes a unit vector.
+std::string problem_of_list(Rule rule, std::span<double> entries);
+
 /// Throws Error for a value of a key that is not as expected. `place`: of the value, with the label of the table.
 [[noreturn]] void refuse_value(const SceneKey& key, const std::string& place, const std::string& text,
                                const std::string& expected);

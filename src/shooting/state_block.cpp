@@ -2,8 +2,6 @@
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
 
-#include <cmath>
-
 namespace squeal
 {
 

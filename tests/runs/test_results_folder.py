@@ -114,7 +114,7 @@ def test_a_kill_between_the_moves_loses_nothing(converged, squeal, tmp_path, mov
     assert contents(output) == expected and not finished.exists() and not (output / ".partial").exists()
 
 
-def test_a_state_inside_the_results_comes_with_them(converged, tmp_path):
+def test_a_state_may_stand_inside_the_results(converged, tmp_path):
     output = tmp_path / "results"
     for _ in range(2):
         converged(SCENE, *SHORT, "--set", f"transient.save_state={output}/end.state", "--output", output, ranks=1)
@@ -182,8 +182,6 @@ REFUSED = {"a pipe": (make_device, "pipe"), "a folder of a file's name": (make_f
            "a folder of a result's name": (make_matrices_of_a_results_name, "no run has made"),
            "matrices in a result's place": (make_scene_on_matrices_of_a_results_name, "fall on"),
            "a link to nothing": (make_link_to_nothing, "File exists"),
-           "a state of the lock's name": (lambda tmp_path: ["--set", f"transient.save_state={tmp_path}/out/.running"], "this name meanwhile"),
-           "a state on the meantime": (lambda tmp_path: ["--set", f"transient.save_state={tmp_path}/out/.partial"], "this name meanwhile"),
            "a log on the scene": (lambda tmp_path: ["-log_view", f":{SCENE}"], "fall on the scene"),
            "a log on a result": (lambda tmp_path: ["-history", tmp_path / "out" / "report.json"], "report.json")}
 

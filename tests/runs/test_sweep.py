@@ -5,7 +5,6 @@ import json
 import subprocess
 import sys
 
-import h5py
 import numpy as np
 import pytest
 from conftest import INPUTS, ROOT
@@ -83,10 +82,6 @@ def test_modes_are_followed(pin):
             tracks = [row["track"] for row in rows
                       if float(row["friction.coefficient"]) == value and int(row["direction"]) == direction]
             assert len(set(tracks)) == len(tracks)
-    # a followed frequency moves by less than its neighbours are apart on average, at the scene's points and between
-    with h5py.File(pin.output / "history.h5") as file:
-        frequency = file["sweep/frequency"][()]
-        assert frequency.shape == (len(sweep["points"]), sweep["followed_modes"])
 
 
 def test_a_mode_has_one_number_in_both_directions(pin):
@@ -338,11 +333,8 @@ def test_motions_stand_in_every_file(cycles):
     with open(cycles.output / "sweep_motions.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["heard"] for row in rows] == [motion["heard"] for motion in motions.values()]
-    with h5py.File(cycles.output / "history.h5") as file:
-        frequency = file["sweep/motion/frequency_hz"][()]
-        stability = file["sweep/motion/stability"][()]
-    assert list(frequency[~np.isnan(frequency)]) == [motion["frequency_hz"] for motion in motions.values()]
-    assert (stability[~np.isnan(frequency)] == 1).all() and (stability[np.isnan(frequency)] == -1).all()
+    assert [float(row["frequency_hz"]) for row in rows] == [motion["frequency_hz"] for motion in motions.values()]
+    assert {row["stability"] for row in rows} == {"stable"}
     assert all(f"{motion['heard']}" in cycles.printed for motion in motions.values())
 
 

@@ -55,9 +55,6 @@ public:
   const std::filesystem::path& partial() const { return partial_; } // to write to
   const std::string& run() const { return run_; }                   // the identity that every file of the run carries
 
-  /// Where a file of the user's own name is written meanwhile: in the partial folder if it belongs into the place.
-  std::filesystem::path meanwhile(const std::filesystem::path& file) const;
-
   std::filesystem::path checkpoints() const { return place_ / word(ResultFile::checkpoints); }
 
   /// Moves the results to their place. Collective.
@@ -92,8 +89,5 @@ bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b
 /// run has made.
 void check_outputs(const Scene& scene, const std::vector<std::filesystem::path>& inputs,
                    const std::filesystem::path& place);
-
-/// Whether a run into the place, an absolute path, uses the name of this file while it works.
-bool is_used_meanwhile(const std::filesystem::path& file, const std::filesystem::path& place);
 
 } // namespace squeal
