@@ -54,7 +54,7 @@ bool turn_shell(ContactSurface& turned, const ContactSurface& other);
 /// Throws Error where master faces cover each other.
 SlaveRows dual_rows(const ContactSurface& slave, const ContactSurface& master, const OverlapLimits& limits);
 
-/// What becomes of a slave node's row.
+/// Fate of a slave node's row.
 enum class RowFate
 {
   kept,     // and may take others
