@@ -63,7 +63,7 @@ enum class RowFate
 };
 
 /// Gives the rows that are given up to the nearest nodes that share a covered face and may take others.
-/// Returns the nodes that found nobody, as places in slave.nodes.
+/// Returns the nodes without such a neighbour, as places in slave.nodes.
 std::vector<std::size_t> hand_over(const ContactSurface& slave, const std::vector<Vec3>& x,
                                    const std::vector<RowFate>& fate, SlaveRows& rows);
 
