@@ -25,7 +25,7 @@ Scene scene_at(const Scene& scene, const std::vector<double>& values)
   return at;
 }
 
-/// What is kept of a cycle that was found.
+/// The parts of a found cycle that are kept.
 void take_cycle(const LimitCycle& cycle, SweptMotion& motion)
 {
   motion.frequency_hz = 1 / cycle.orbit.period;

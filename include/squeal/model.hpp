@@ -64,10 +64,11 @@ private:
   PartsMade made_{};
 };
 
-/// What the model is, as far as it is known before anything is solved; warnings and length on rank 0. Collective.
+/// Description of the model, as far as it is known before anything is solved; warnings and length on rank 0.
+/// Collective.
 ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm);
 
-/// What the probes read of a displacement [m], whole on every rank. Collective.
+/// The probes' values of a displacement [m], whole on every rank. Collective.
 std::vector<double> probe_values(Mat probes, Vec u);
 
 } // namespace squeal

@@ -68,7 +68,7 @@ public:
   /// Entries of L and E on all ranks.
   double entries() const { return share_.symbolic.entries; }
 
-  /// Those of E alone. Collective.
+  /// Entries of E alone. Collective.
   double border_entries() const;
 
 private:
@@ -95,7 +95,7 @@ private:
 /// The largest memory that a Cholesky takes on one rank [bytes].
 double cholesky_memory(const SymbolicFactor& symbolic);
 
-/// The same of this rank's share.
+/// The largest memory that this rank's share of one takes [bytes].
 double cholesky_memory(const TreeShare& share);
 
 } // namespace squeal

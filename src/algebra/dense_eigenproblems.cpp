@@ -329,7 +329,7 @@ std::vector<std::size_t> nearest_places(const std::vector<std::complex<double>>&
 {
   std::vector<std::size_t> places(values.size());
   std::iota(places.begin(), places.end(), 0U);
-  const auto distance = [&](std::size_t reference, std::size_t place) // those beyond the references are for nobody
+  const auto distance = [&](std::size_t reference, std::size_t place) // those beyond the references stay unmatched
   { return reference < references.size() ? std::abs(values[place] - references[reference]) : 0; };
   for (std::size_t i = 0; i < references.size(); ++i)
     for (std::size_t k = i + 1; k < values.size(); ++k)

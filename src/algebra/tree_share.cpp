@@ -29,7 +29,7 @@ void broadcast_analysis(SymbolicFactor& symbolic, MPI_Comm comm)
   MPI_Bcast(&symbolic.entries, 1, MPI_DOUBLE, 0, comm);
 }
 
-/// What a supernode costs [operations] to eliminate, with its part of the Schur complement. An entry costs a thousand
+/// Cost of eliminating a supernode [operations], with its part of the Schur complement. An entry costs a thousand
 /// operations more, since hundreds of solves read it at the speed of memory.
 struct Cost
 {

@@ -19,7 +19,7 @@ struct Subtree
   std::vector<int> below{}; // positions of the rows
 };
 
-/// Of a shared supernode.
+/// The parts of a shared supernode that other ranks have.
 struct SharedSupernode
 {
   std::vector<Subtree> branches{};

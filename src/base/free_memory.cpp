@@ -20,7 +20,7 @@ namespace squeal
 namespace
 {
 
-/// What the node and the limits of its control group leave [byte].
+/// Memory that the node and the limits of its control group leave [byte].
 double free_memory_of_node()
 {
   double cgroup = HUGE_VAL, used = 0;

@@ -16,7 +16,7 @@ struct Bounds
   const char* text;
 };
 
-/// What the range holds; every number must be finite as well.
+/// The test and the text of a range; every number must be finite as well.
 Bounds bounds_of(Range range)
 {
   switch (range)

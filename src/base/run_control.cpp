@@ -33,7 +33,7 @@ const std::string rank_by_launcher = []() -> std::string
   return {};
 }();
 
-/// Those of terminals, and those by which schedulers announce a limit.
+/// Signals of terminals, and those by which schedulers announce a limit.
 constexpr std::array<std::pair<int, const char*>, 6> ending_signals = {{{SIGTERM, "SIGTERM"},
                                                                         {SIGINT, "SIGINT"},
                                                                         {SIGHUP, "SIGHUP"},

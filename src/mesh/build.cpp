@@ -20,7 +20,7 @@ namespace squeal
 namespace
 {
 
-/// What to do about elements of a type that squeal has no kernel for.
+/// Advice for elements of a type that squeal has no kernel for.
 std::string remedy(int gmsh_type)
 {
   switch (gmsh_type)

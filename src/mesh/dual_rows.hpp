@@ -54,7 +54,7 @@ bool turn_shell(ContactSurface& turned, const ContactSurface& other);
 /// Throws Error where master faces cover each other.
 SlaveRows dual_rows(const ContactSurface& slave, const ContactSurface& master, const OverlapLimits& limits);
 
-/// What becomes of a slave node's row.
+/// Fate of a slave node's row.
 enum class RowFate
 {
   kept,     // and may take others
@@ -63,7 +63,7 @@ enum class RowFate
 };
 
 /// Gives the rows that are given up to the nearest nodes that share a covered face and may take others.
-/// Returns the nodes that found nobody, as places in slave.nodes.
+/// Returns the nodes without such a neighbour, as places in slave.nodes.
 std::vector<std::size_t> hand_over(const ContactSurface& slave, const std::vector<Vec3>& x,
                                    const std::vector<RowFate>& fate, SlaveRows& rows);
 

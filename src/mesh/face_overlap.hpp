@@ -26,7 +26,7 @@ struct PlacedFace
   bool two_sided = false; // a shell's
 };
 
-/// What the master faces cover of one slave face. Functions chi are the slave's, N the master's.
+/// The part of one slave face that master faces cover. Functions chi are the slave's, N the master's.
 struct CoveredFace
 {
   struct Master
@@ -39,7 +39,7 @@ struct CoveredFace
   std::vector<Master> masters;
 };
 
-/// What overlaps were left out, or contain each other. Places are on the slave face.
+/// Overlaps that were left out, or contain each other. Places are on the slave face.
 struct OverlapFindings
 {
   double nearest = 0; // [m] gap of the nearest one beyond the limit, negative inside; 0: none

@@ -38,7 +38,7 @@ std::vector<std::string> tokens_of(const std::string& text)
     if (text.compare(i, 2, "//") == 0)
       end = text.find('\n', i);
     else if (text.compare(i, 2, "/*") == 0)
-      end = text.find("*/", i + 2) + 1; // the last / is a token that nothing heeds
+      end = text.find("*/", i + 2) + 1; // the last / is a token without a meaning
     else if (c == '"' || c == '\'')
     {
       end = std::min(text.find(c, i + 1), text.size());

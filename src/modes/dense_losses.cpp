@@ -56,8 +56,8 @@ std::vector<Complex> lambdas_of(const std::vector<TwoSidedPair>& pairs)
   return values;
 }
 
-/// Drops pairs that real ones become. Where there are more pairs than oscillate without losses, these are among the
-/// pairs that are nobody's, the ones that are nearest to a real one.
+/// Drops the pairs that real eigenvalues become under losses. Where there are more pairs than oscillate without losses,
+/// they are the unmatched pairs nearest to a real one.
 void drop_real(std::vector<TwoSidedPair>& pairs, const std::vector<TwoSidedPair>& without)
 {
   std::vector<Complex> vibrating;

@@ -37,7 +37,7 @@ std::size_t unstable_among(const Followed& point, const PointNumbers& places)
       std::ranges::count_if(places, [&](std::size_t place) { return instability(point, place) > 0; }));
 }
 
-/// Modes of two points that are each other's as a whole; or those of the band that are nobody's.
+/// A cluster of modes that two points match with each other; or the modes of the band that have no match.
 struct Group
 {
   PointNumbers from, to; // matched ones stand at the same place of both

@@ -77,14 +77,14 @@ struct SymmetricEigenpairs
   Eigen::MatrixXd y;
 };
 
-/// Of a symmetric A, with y of 2-norm 1, by divide and conquer: six times as fast as QR at 1200 rows.
+/// The pairs of a symmetric A, with y of 2-norm 1, by divide and conquer: six times as fast as QR at 1200 rows.
 SymmetricEigenpairs solve_dense_symmetric(Eigen::MatrixXd A);
 
 /// The finite eigenvalues of K y = lambda M y and M-normalised y. M is symmetric positive semidefinite,
 /// K - shift M symmetric positive definite, shift < 0.
 SymmetricEigenpairs solve_dense_symmetric(const Eigen::MatrixXd& M, const Eigen::MatrixXd& K, double shift);
 
-/// The same from the matrices of rank 0, with the pairs on every rank. Collective.
+/// These pairs from the matrices of rank 0, on every rank. Collective.
 SymmetricEigenpairs solve_dense_symmetric_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& K,
                                                  double shift);
 

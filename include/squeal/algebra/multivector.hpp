@@ -55,7 +55,7 @@ MultiVector columns_from(const MultiVector& X, Eigen::Index first);
 /// X'Y, the same to the last bit on every rank.
 Eigen::MatrixXd inner_products(const MultiVector& X, const MultiVector& Y);
 
-/// The same where the result is symmetric, as X'A X: half the work.
+/// X'Y where it is symmetric, as X'A X: half the work.
 Eigen::MatrixXd symmetric_inner_products(const MultiVector& X, const MultiVector& Y);
 
 /// X'A X of a symmetric A. A X is formed some columns at a time, which `visit` is shown from their first one on.

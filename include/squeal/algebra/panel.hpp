@@ -55,7 +55,7 @@ void solve_transposed_triangle(const double* L, std::size_t columns, std::size_t
 /// triangle is read once.
 void add_symmetric_product(const double* W, std::size_t size, std::size_t columns, const double* x, double* y);
 
-/// The same of at least four lanes.
+/// Adds the same product of at least four lanes.
 void add_symmetric_product(const double* W, std::size_t size, std::size_t columns, std::size_t lanes, const double* x,
                            double* y);
 

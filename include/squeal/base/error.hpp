@@ -78,7 +78,7 @@ std::string shortened(const std::string& text);
 
 /// Whether there is a plain file, or a folder, of this name; no name is too long to ask for.
 bool is_file(const std::filesystem::path& name);
-/// The same for a folder.
+/// Whether there is a folder of this name.
 bool is_folder(const std::filesystem::path& name);
 
 /// Why the name is not that of a plain file; empty if it is.
@@ -90,7 +90,7 @@ std::string problem_of_file(const std::filesystem::path& name);
 /// Number of single-character insertions, deletions and substitutions that turn `a` into `b` (Levenshtein 1966).
 int edit_distance(const std::string& a, const std::string& b);
 
-/// Of `known`, the word with the smallest edit distance to `word`; empty if none is near.
+/// The word of `known` with the smallest edit distance to `word`; empty if none is near.
 template <class Words> std::string nearest_word(const std::string& word, const Words& known)
 {
   std::string best;

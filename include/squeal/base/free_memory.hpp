@@ -6,7 +6,7 @@
 namespace squeal
 {
 
-/// What all nodes together and the limits of their control groups leave [byte]. Collective.
+/// Memory that all nodes together and the limits of their control groups leave [byte]. Collective.
 double free_memory(MPI_Comm comm);
 
 /// Returns to the system the pages that freed arrays leave within the heap. The GNU allocator keeps them: at 239 246

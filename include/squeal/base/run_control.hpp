@@ -15,7 +15,7 @@ struct Interrupted
 {
 };
 
-/// What ends a run by itself, and how often it makes checkpoints.
+/// Limits that end a run by itself, and how often it makes checkpoints.
 struct RunLimits
 {
   double time_limit = 0;            // [s] from the start of the process; 0: none
@@ -59,7 +59,7 @@ void end_if_asked(MPI_Comm comm);
 bool checkpoint_is_due();
 
 /// Whether a tenth of the time between checkpoints has passed since the last one: what ends now is then worth one.
-/// Of rank 0's clock; collective.
+/// By rank 0's clock; collective.
 bool checkpoint_is_worth_it(MPI_Comm comm);
 /// Notes that a checkpoint was made; the next is due a period later.
 void checkpoint_made();

@@ -6,7 +6,7 @@
 namespace squeal
 {
 
-/// What the name of a file ends in until it is whole.
+/// Ending of a file's name until it is whole.
 inline constexpr const char* unfinished_ending = ".part";
 
 /// Writes a file; one that was there stays until the new one is whole. Error: the file, the system's reason, the space

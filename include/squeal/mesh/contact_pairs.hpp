@@ -27,7 +27,7 @@ struct ContactPair
   int slave_nodes = 1;                 // number of the slave side's
 };
 
-/// What part of a contact's slave surface faces the master surface, and what the curvature of both leaves.
+/// The part of a contact's slave surface that faces the master surface, and the mismatch that curvature leaves.
 struct Coverage
 {
   double area = 0, covered = 0; // [m2] of the slave surface

@@ -48,7 +48,7 @@ struct Face
   bool of_shell = false;      // counter-clockwise as the shell's nodes are, which may be seen from either side
 };
 
-/// What a row of a superelement's matrices is: a motion of a node.
+/// A row of a superelement's matrices: a motion of a node.
 struct SuperelementRow
 {
   int node = 0;            // index in Mesh::nodes

@@ -1,5 +1,5 @@
 #pragma once
-/// What the rows of another code's matrices are, by the text files beside them. Not collective: the caller reads on
+/// Meaning of the rows of another code's matrices, by the text files beside them. Not collective: the caller reads on
 /// rank 0.
 #include "squeal/base/vec3.hpp"
 
