@@ -167,6 +167,23 @@ double distance(const BranchCorrector& corrector, const ExaminedOrbit& from, con
   return std::sqrt(scaled_product(corrector, step, step));
 }
 
+/// Whether contact does the same on both orbits, so that a parabola may hold between them.
+bool alike(const ExaminedOrbit& a, const ExaminedOrbit& b)
+{
+  return moves(a.measures) == moves(b.measures) && (a.measures.stick_steps > 0) == (b.measures.stick_steps > 0);
+}
+
+/// How far beyond the middle one of three orbits the parameter may turn, where either side bends towards its turn: the
+/// line of each side goes on to the other one's end.
+double rise_to_corner(const BranchCorrector& corrector, const std::array<const ExaminedOrbit*, 3>& orbits)
+{
+  const double before = distance(corrector, *orbits[0], *orbits[1]),
+               after = distance(corrector, *orbits[1], *orbits[2]);
+  const double of_first = std::abs(orbits[1]->corrected.parameter - orbits[0]->corrected.parameter),
+               of_second = std::abs(orbits[2]->corrected.parameter - orbits[1]->corrected.parameter);
+  return std::max(of_first / before * after, of_second / after * before);
+}
+
 } // namespace
 
 ExaminedOrbit examine(BranchCorrector& corrector, CorrectedOrbit corrected, Examined wanted)
@@ -232,22 +249,32 @@ std::optional<BranchEvent> fold_among(BranchCorrector& corrector, const std::arr
   const double least = 1e-6 * corrector.scales.parameter;
   if (std::min(std::abs(parameter(1) - parameter(0)), std::abs(parameter(2) - parameter(1))) < least) return {};
   if (!((parameter(1) - parameter(0)) * (parameter(2) - parameter(1)) < 0)) return {};
-  std::array<ExaminedOrbit, 2> found;
-  BranchEvent event = event_at(BranchEventKind::fold, *points[1], 0.5 * std::abs(parameter(2) - parameter(0)));
-  for (ExaminedOrbit& fold : found)
+  constexpr int by_parabola = 2, at_corner = 8;
+  std::array<ExaminedOrbit, at_corner> found;
+  double change = 0.5 * std::abs(parameter(2) - parameter(0));
+  for (int pass = 0; pass < at_corner; ++pass)
   {
+    const bool corner = pass >= by_parabola;
+    if (corner && alike(*now[0], *now[1]) && alike(*now[1], *now[2])) break;
     const double before = distance(corrector, *now[0], *now[1]), after = distance(corrector, *now[1], *now[2]);
-    const double at = vertex({-before, 0, after}, {parameter(0), parameter(1), parameter(2)});
+    const double at = corner ? 0.5 * (after > before ? after : -before)
+                             : vertex({-before, 0, after}, {parameter(0), parameter(1), parameter(2)});
     const std::size_t side = at < 0 ? 0 : 1;
     const double part = std::clamp(at < 0 ? 1 + at / before : at / after, 0., 1.);
     std::optional<CorrectedOrbit> corrected = correct_between(corrector, *now[side], *now[side + 1], part);
     if (!corrected) break;
+    ExaminedOrbit& fold = found[static_cast<std::size_t>(pass)];
     fold = examine(corrector, std::move(*corrected), Examined::measures_alone);
-    event = event_at(BranchEventKind::fold, fold, std::abs(fold.corrected.parameter - event.parameter));
-    now = side == 0 ? std::array{now[0], static_cast<const ExaminedOrbit*>(&fold), now[1]}
-                    : std::array{now[1], static_cast<const ExaminedOrbit*>(&fold), now[2]};
+    const double beyond = (fold.corrected.parameter - parameter(1)) * (parameter(1) - parameter(0));
+    change = std::abs(fold.corrected.parameter - parameter(1));
+    if (corner && beyond < 0)
+      now[side == 0 ? 0 : 2] = &fold;
+    else
+      now = side == 0 ? std::array{now[0], static_cast<const ExaminedOrbit*>(&fold), now[1]}
+                      : std::array{now[1], static_cast<const ExaminedOrbit*>(&fold), now[2]};
   }
-  return event;
+  if (!alike(*now[0], *now[1]) || !alike(*now[1], *now[2])) change = std::max(change, rise_to_corner(corrector, now));
+  return event_at(BranchEventKind::fold, *now[1], change);
 }
 
 } // namespace squeal
