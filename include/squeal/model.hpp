@@ -68,6 +68,9 @@ private:
 /// Collective.
 ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm);
 
+/// Adds to what probes read of an equilibrium by how much supports move their nodes [m]. Collective.
+void add_shifts(const Scene& scene, const Model& model, std::vector<double>& values, MPI_Comm comm);
+
 /// The probes' values of a displacement [m], whole on every rank. Collective.
 std::vector<double> probe_values(Mat probes, Vec u);
 

@@ -39,6 +39,7 @@ std::span<double> numbers_of(const Target& target, WordsLeft& words)
   if (Vec3* const* vector = std::get_if<Vec3*>(&target)) return **vector;
   if (auto* const* vector = std::get_if<std::optional<Vec3>*>(&target)) return ***vector;
   if (auto* const* list = std::get_if<std::array<double, 6>*>(&target)) return **list;
+  if (auto* const* list = std::get_if<std::vector<double>*>(&target)) return **list;
   auto* const* vectors = std::get_if<std::vector<Vec3>*>(&target);
   const auto place = vectors && !words.empty() ? place_in((*vectors)->size(), words.front()) : std::nullopt;
   if (!place) return {};
@@ -147,6 +148,7 @@ Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers)
   Places places{scene.file.string(), {}};
   for (const Part& part : changed.parts)
     if (!part.material.orthotropy) places.given[&part.material.poisson] = places.file;
+  for (const Force& force : changed.forces) places.given[&force.vector] = places.file;
   for (const auto& [key, value] : numbers)
   {
     const std::string given = "--set " + key + "=" + text_of_number(value);

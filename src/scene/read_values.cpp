@@ -416,7 +416,7 @@ std::string problem_of_number(Rule rule, double value)
 
 std::string problem_of_list(Rule rule, std::span<double> entries)
 {
-  if (entries.size() == 6 && std::min({entries[0], entries[1], entries[2]}) < 0) return "no negative xx, yy or zz";
+  if (rule == Rule::inertia && std::min({entries[0], entries[1], entries[2]}) < 0) return "no negative xx, yy or zz";
   if (rule != Rule::direction) return {};
   const double length = std::hypot(entries[0], entries[1], entries[2]);
   if (length == 0) return "a direction, not the zero vector";

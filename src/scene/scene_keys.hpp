@@ -71,6 +71,7 @@ enum class Rule
   fraction,  // in (0, 1]
   direction, // a vector that is normalised, or "x", "-y" and so on
   velocity,  // a vector; zero: none
+  inertia,   // moments xx, yy, zz, none negative, and products
   file,      // an existing file
   folder,    // an existing folder
 };
@@ -127,6 +128,14 @@ bool has_unit(const std::string& unit);
 /// Returns the keys of a scene file, its tables in the order in which they are written.
 SceneKeys keys_of(Scene& scene);
 
+/// Keys of what joins bodies.
+SceneKeys keys_of(Axis& axis);
+SceneKeys keys_of(Coupling& coupling);
+SceneKeys keys_of(Connector& connector);
+SceneKeys keys_of(Beam& beam);
+SceneKeys keys_of(AddedMass& mass);
+SceneKeys keys_of(Bolt& bolt);
+
 /// Keys of the tables of stages and studies.
 SceneKeys keys_of(ModesSettings& modes);
 SceneKeys keys_of(EstimateSettings& estimate);
@@ -160,6 +169,9 @@ template <class Entry> std::vector<std::string> names_of(const std::vector<Entry
 
 /// Throws Error on contradictions between keys: undefined or repeated names, tables that exclude each other.
 void check_scene(const Scene& scene, const Places& places);
+
+/// Of what joins bodies, of the frames of supports and of loss factors.
+void check_joining(const Scene& scene, const Places& places);
 
 /// Gives undriven contacts without a friction of their own that of the scene, which sweeps then change elsewhere alone.
 void resolve_friction(Scene& scene);
