@@ -29,7 +29,8 @@ SceneKeys keys_of(Coupling& c)
       {"at", &c.at, "m", "reference point", required, mesh},
       {"weights", &c.weights, "-", "of each node in the mean, one a group; 1 when absent", positive},
       {"mass", &c.mass, "kg", "mass at the reference point", not_negative, mass},
-      {"inertia", &c.inertia, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about the reference point", mass, Rule::inertia},
+      {"inertia", &c.inertia, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about the reference point", mass,
+       Rule::inertia},
   };
 }
 

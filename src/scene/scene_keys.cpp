@@ -153,7 +153,8 @@ SceneKeys keys_of(RigidBody& b)
       {"surfaces", &b.surfaces, "texts", "a named surface, or a list of them", required},
       {"at", &b.at, "m", "reference point", required, mesh},
       {"mass", &b.mass, "kg", "mass at the reference point", not_negative, mass},
-      {"inertia", &b.inertia, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about the reference point", mass, Rule::inertia},
+      {"inertia", &b.inertia, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about the reference point", mass,
+       Rule::inertia},
       {"free", &b.free, "motions", "motions that are free: any of x y z rx ry rz, or all, none", required},
       {"motions", &b.motions, "motions", "motions of the surfaces' nodes that follow it; the others are their own"},
   };
