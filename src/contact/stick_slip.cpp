@@ -61,18 +61,6 @@ struct PairState
   }
 };
 
-PairState pair_state(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at,
-                     std::size_t pair)
-{
-  const std::span<const double> e = TangentView<const double>(friction.e, of.directions).of(pair);
-  return {entries(at.r, pair, of.directions),
-          entries(at.w, pair, of.directions),
-          friction.mu[pair],
-          {e[0], e.size() > 1 ? e[1] : 0},
-          of.rho[pair],
-          rounding * at.r.lpNorm<Eigen::Infinity>()};
-}
-
 /// The forces that defects of each contact's pairs are compared with [N]: its largest reaction, or a small part of all
 /// contacts' and of what slips would take, where a contact is about to open.
 std::vector<double> scales_of(const StickSlipOperator& of, const StickSlipState& at)
@@ -85,6 +73,29 @@ std::vector<double> scales_of(const StickSlipOperator& of, const StickSlipState&
                              [&](std::size_t pair)
                              { return std::max(entries(at.r, pair, of.directions).norm(), small * slip); });
 }
+
+/// All pairs before a step of the iteration.
+struct PairStates
+{
+  const StickSlipOperator& of;
+  const StickSlipFriction& friction;
+  const StickSlipState& at;
+  std::vector<double> scale = scales_of(of, at);
+  double grazing = rounding * *std::ranges::max_element(scale);
+
+  double scale_of(std::size_t pair) const { return scale[static_cast<std::size_t>(of.contact[pair])]; }
+
+  PairState operator[](std::size_t pair) const
+  {
+    const std::span<const double> e = TangentView<const double>(friction.e, of.directions).of(pair);
+    return {entries(at.r, pair, of.directions),
+            entries(at.w, pair, of.directions),
+            friction.mu[pair],
+            {e[0], e.size() > 1 ? e[1] : 0},
+            of.rho[pair],
+            grazing};
+  }
+};
 
 VectorXd times_M(const StickSlipOperator& of, const VectorXd& r)
 {
@@ -102,9 +113,9 @@ double imbalance(const StickSlipOperator& of, const VectorXd& q, const StickSlip
 
 double sum_of_squares(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
 {
+  const PairStates states{of, friction, at};
   double sum = 0;
-  for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
-    sum += pair_state(of, friction, at, pair).defect().squaredNorm();
+  for (std::size_t pair = 0; pair < of.rho.size(); ++pair) sum += states[pair].defect().squaredNorm();
   return sum;
 }
 
@@ -140,67 +151,64 @@ std::optional<DividedOperator> divided(StickSlipOperator& of)
 
 double stick_slip_residual(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
 {
-  const std::vector<double> scale = scales_of(of, at);
+  const PairStates states{of, friction, at};
   double worst = 0;
   for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
-    if (const double defect = pair_state(of, friction, at, pair).defect().norm(); defect > 0)
-    {
-      const double own = scale[static_cast<std::size_t>(of.contact[pair])];
-      worst = std::max(worst, own > 0 ? defect / own : std::numeric_limits<double>::infinity());
-    }
+    if (const double defect = states[pair].defect().norm(); defect > 0)
+      worst = std::max(worst, states.scale_of(pair) > 0 ? defect / states.scale_of(pair)
+                                                        : std::numeric_limits<double>::infinity());
   return worst;
 }
 
-/// The unknowns of a closed pair: r_n first; then the friction of a pair that sticks, or the slip of one that slips.
-void StatusSystem::close(PairSystem& system, std::size_t pair, const StickSlipFriction& friction,
-                         const StickSlipState& at)
+namespace
 {
-  const PairState state = pair_state(of_, friction, at, pair);
-  const double force = 1 / of_.compliance, h = state.pressing();
-  system.w[0] = -state.w[0];
-  system.R(0, 0) = force;
-  system.forces = 1;
+
+/// The unknowns of a closed pair: r_n first; then the friction of a pair that sticks, or the slip of one that slips.
+/// `force`: an unknown's unit.
+LinearPairLaw closed_law(const PairState& state, double force, int directions)
+{
+  LinearPairLaw law;
+  const double h = state.pressing();
+  law.w[0] = -state.w[0];
+  law.R(0, 0) = force;
+  law.forces = 1;
   if (state.status() == ContactStatus::stick)
   {
-    system.w.tail<2>() = -state.w.tail<2>();
-    system.R(1, 1) = system.R(2, 2) = force;
-    system.forces = 1 + of_.directions;
-    return;
+    law.w.tail<2>() = -state.w.tail<2>();
+    law.R(1, 1) = law.R(2, 2) = force;
+    law.forces = 1 + directions;
+    return law;
   }
   if (!state.e.isZero(0) || state.mu == 0)
   {
-    system.r.tail<2>() = state.mu * state.r[0] * state.e - state.r.tail<2>();
-    system.R.block<2, 1>(1, 0) = state.mu * force * state.e;
-    system.W(1, 1) = system.W(2, 2) = 1;
-    return;
+    law.r.tail<2>() = state.mu * state.r[0] * state.e - state.r.tail<2>();
+    law.R.block<2, 1>(1, 0) = state.mu * force * state.e;
+    law.W(1, 1) = law.W(2, 2) = 1;
+    return law;
   }
   // dr_t - mu d dh - a (1 - d d')(dr_t - rho dw_t) = mu h d - r_t,  dh = dr_n + rho_n w_n,  a = mu h/|t|
   const Eigen::Vector2d t = state.pulling(), d = t / t.norm(), across(-d[1], d[0]);
   const double a = state.mu * h / t.norm(), size = (1 - a) * (1 - a) + a * a, rest = -across.dot(state.r.tail<2>());
-  system.R.block<2, 1>(1, 0) = state.mu * force * d;
-  system.r.tail<2>() =
+  law.R.block<2, 1>(1, 0) = state.mu * force * d;
+  law.r.tail<2>() =
       (state.mu * (h + state.rho.normal * state.w[0]) - d.dot(state.r.tail<2>())) * d + (1 - a) * rest / size * across;
-  system.w.tail<2>() = a * rest / (state.rho.tangential * size) * across;
-  system.W.block<2, 1>(1, 1) = of_.directions == 1 ? Eigen::Vector2d(1, 0) : d; // no turn: the index keeps its sign
-  system.W.block<2, 1>(1, 2) = (1 - a) * across;
-  system.R.block<2, 1>(1, 2) = -a * state.rho.tangential * across;
+  law.w.tail<2>() = a * rest / (state.rho.tangential * size) * across;
+  law.W.block<2, 1>(1, 1) = directions == 1 ? Eigen::Vector2d(1, 0) : d; // no turn: the index keeps its sign
+  law.W.block<2, 1>(1, 2) = (1 - a) * across;
+  law.R.block<2, 1>(1, 2) = -a * state.rho.tangential * across;
+  return law;
 }
 
-StatusSystem::PairSystem StatusSystem::system_of(std::size_t pair, const StickSlipFriction& friction,
-                                                 const StickSlipState& at)
+LinearPairLaw linear_law(const PairState& state, double force, int directions)
 {
-  PairSystem system;
-  const PairState state = pair_state(of_, friction, at, pair);
-  statuses_.push_back(state.status());
-  if (statuses_.back() == ContactStatus::open)
-  {
-    system.r = -state.r;
-    system.W.setIdentity();
-  }
-  else
-    close(system, pair, friction, at);
-  return system;
+  if (state.status() != ContactStatus::open) return closed_law(state, force, directions);
+  LinearPairLaw law;
+  law.r = -state.r;
+  law.W.setIdentity();
+  return law;
 }
+
+} // namespace
 
 StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
     : of_(of)
@@ -209,9 +217,12 @@ StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction&
   const Index own = rows.per_pair();
   const bool whole = of.M.size() > 0;
   particular_ = {VectorXd::Zero(of.N.rows()), VectorXd::Zero(of.N.rows())};
+  const PairStates states{of, friction, at};
   for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
   {
-    const PairSystem& system = pairs_.emplace_back(system_of(pair, friction, at));
+    const PairState state = states[pair];
+    statuses_.push_back(state.status());
+    const LinearPairLaw& system = pairs_.emplace_back(linear_law(state, 1 / of.compliance, of.directions));
     const Index first = rows.normal(static_cast<Index>(pair));
     particular_.r.segment(first, own) = system.r.head(own);
     particular_.w.segment(first, own) = system.w.head(own);
@@ -223,7 +234,7 @@ StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction&
   matrix_.resize(size, size);
   for (std::size_t i = 0; i < unknown_.size(); ++i)
   {
-    const PairSystem& system = pairs_[unknown_[i]];
+    const LinearPairLaw& system = pairs_[unknown_[i]];
     const Index first = rows.normal(static_cast<Index>(unknown_[i])), to = rows.normal(static_cast<Index>(i));
     const auto of_pair = Eigen::seqN(first, own);
     auto columns = matrix_.middleCols(to, own);
@@ -245,7 +256,7 @@ StickSlipState StatusSystem::spread(const VectorXd& y) const
   const Index own = rows.per_pair();
   for (std::size_t i = 0; i < unknown_.size(); ++i)
   {
-    const PairSystem& system = pairs_[unknown_[i]];
+    const LinearPairLaw& system = pairs_[unknown_[i]];
     const Index first = rows.normal(static_cast<Index>(unknown_[i]));
     const auto of_pair = y.segment(rows.normal(static_cast<Index>(i)), own);
     result.r.segment(first, own) = system.R.topLeftCorner(own, own) * of_pair;

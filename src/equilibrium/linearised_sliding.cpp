@@ -257,26 +257,37 @@ Owned<Mat> assemble_basis(const Elimination& elimination, double Coefficients::*
   return result;
 }
 
-// R'[pivots] lambda = f[pivots], and the elimination found T with T R[pivots] = I: lambda = T' f[pivots], of which the
-// normal ones are taken. Likewise of B_n.
-Owned<Mat> assemble_reaction(const std::vector<Row>& rows, double Coefficients::*kind,
-                             const std::vector<PetscInt>& pivots, const std::vector<HeldRow>& held,
-                             const Interface& interface)
+// The reactions that are asked for: of normal rows, or of tangential ones, by pairs and directions.
+enum class ReactionRows
 {
+  normal,
+  tangential,
+};
+
+// R'[pivots] lambda = f[pivots], and the elimination found T with T R[pivots] = I: lambda = T' f[pivots]. Likewise of
+// B_n.
+Owned<Mat> assemble_reaction(const Elimination& elimination, double Coefficients::*kind, ReactionRows wanted,
+                             const std::vector<HeldRow>& held, const Interface& interface)
+{
+  const std::vector<Row>& rows = elimination.rows;
+  const bool normal = wanted == ReactionRows::normal;
   PetscInt first = 0, last = 0, dofs = 0;
   check(MatGetOwnershipRangeColumn(interface.B, &first, &last));
   check(MatGetSize(interface.B, nullptr, &dofs));
   Owned<Mat> result;
   check(MatCreate(comm_of(interface.B), result.put()));
-  check(MatSetSizes(result, PETSC_DECIDE, last - first, interface.pairs, dofs));
+  check(MatSetSizes(result, PETSC_DECIDE, last - first, interface.pairs * (normal ? 1 : interface.directions), dofs));
   check(MatSetType(result, MATAIJ));
   check(MatSetUp(result));
   check(MatSetOption(result, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE)); // rows that share pivots fill in
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    if (pivots[i] >= first && pivots[i] < last)
-      for (auto entry = rows[i].lower_bound(dofs); entry != rows[i].end(); ++entry)
-        if (const auto [pair, component] = held[static_cast<std::size_t>(entry->first - dofs)]; component == 0)
-          check(MatSetValue(result, pair, pivots[i], entry->second.*kind, INSERT_VALUES));
+  for (const auto& [pivot, i] : elimination.row_of)
+    for (auto entry = rows[i].lower_bound(dofs); pivot >= first && pivot < last && entry != rows[i].end(); ++entry)
+    {
+      const auto [pair, component] = held[static_cast<std::size_t>(entry->first - dofs)];
+      if ((component == 0) != normal) continue;
+      const PetscInt row = normal ? pair : pair * interface.directions + component - 1;
+      check(MatSetValue(result, row, pivot, entry->second.*kind, INSERT_VALUES));
+    }
   check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
   return result;
@@ -308,8 +319,11 @@ ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface
   std::sort(elimination.pivots.begin(), elimination.pivots.end());
   result.Z = assemble_basis(elimination, &Coefficients::normal, structure.K);
   result.Y = assemble_basis(elimination, &Coefficients::sliding, structure.K);
-  result.reaction = assemble_reaction(rows, &Coefficients::sliding, pivots, held, interface);
-  result.normal_reaction = assemble_reaction(rows, &Coefficients::normal, pivots, held, interface);
+  const auto reaction_of = [&](double Coefficients::*kind, ReactionRows wanted)
+  { return assemble_reaction(elimination, kind, wanted, held, interface); };
+  result.reaction = reaction_of(&Coefficients::sliding, ReactionRows::normal);
+  result.normal_reaction = reaction_of(&Coefficients::normal, ReactionRows::normal);
+  if (has_undriven_pairs(interface)) result.friction = reaction_of(&Coefficients::sliding, ReactionRows::tangential);
   result.pivots = elimination.pivots;
   return result;
 }

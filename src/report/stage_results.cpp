@@ -173,6 +173,8 @@ void add_estimate(Entry out, const Report& report)
   out.show("mean_energy", "J", "mean energy of the vibration there", has_balance ? Json(estimate.mean_energy) : Json());
   out.show("lift_off_amplitude", "m", "amplitude at which the first pair lifts off", estimate.lift_off_amplitude);
   out.show("reversal_amplitude", "m", "amplitude at which sliding first reverses", estimate.reversal_amplitude);
+  if (out.has(std::isfinite(estimate.slip_amplitude)))
+    out.show("slip_amplitude", "m", "amplitude at which the first pair that sticks slips", estimate.slip_amplitude);
   out.show("damping_rate", "1/s", "power of damping over energy", estimate.damping_rate);
   out.show("friction_rate_linear", "1/s", "power of friction over energy, at small ones",
            estimate.friction_rate_linear);

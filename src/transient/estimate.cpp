@@ -1,5 +1,6 @@
 #include "squeal/transient/estimate.hpp"
 
+#include "squeal/algebra/quadratic_residual.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
@@ -183,6 +184,76 @@ std::vector<PairMotion> pair_motions(const SlidingEquilibrium& sliding, const Li
   return pairs;
 }
 
+// A pair that sticks, with what the mode adds to its reaction per metre of q.
+struct StuckPair
+{
+  double mu = 0;
+  PairVector reaction0{};            // [N]
+  std::array<Complex, 3> reaction{}; // [N/m]
+};
+
+// The least q at which friction reaches its limit at some instant: |a + q b|^2 = mu^2 (n + q m)^2.
+double first_slip(const StuckPair& pair)
+{
+  constexpr int instants = 720;
+  double least = infinity;
+  for (int i = 0; i < instants; ++i)
+  {
+    const Complex turn = std::polar(1.0, two_pi * i / instants);
+    double A = 0, B = 0, C = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+    {
+      const double sign = k == 0 ? -pair.mu * pair.mu : 1, b = real_part(pair.reaction[k], turn);
+      A += sign * b * b;
+      B += sign * b * pair.reaction0[k];
+      C += sign * pair.reaction0[k] * pair.reaction0[k];
+    }
+    const double root = B * B - A * C;
+    if (root >= 0 && B + std::sqrt(root) > 0) least = std::min(least, std::max(0., -C) / (B + std::sqrt(root)));
+  }
+  return least;
+}
+
+// Those that stick at the end of the load path. Collective.
+std::vector<StuckPair> stuck_pairs(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
+                                   const ComplexMode& mode)
+{
+  const auto& [structure, interface, equilibrium] = sliding;
+  std::vector<StuckPair> pairs;
+  if (!equilibrium.history) return pairs;
+  const QuadraticMatrices matrices{structure.M, linearised.C,
+                                   linearised.K.get() ? linearised.K.get() : structure.K.get()};
+  const Owned<Vec> real = zeros_like(mode.real), imaginary = zeros_like(mode.real);
+  quadratic_residual(matrices, mode.lambda, {mode.real, mode.imaginary}, {real, imaginary});
+  const auto friction_of = [&](Vec force, Vec motion)
+  {
+    Owned<Vec> rows;
+    check(MatCreateVecs(linearised.contact.friction, nullptr, rows.put()));
+    check(MatMult(linearised.contact.friction, force, rows));
+    std::vector<double> friction = all_entries(rows);
+    const std::vector<double> moved = relative(interface, motion);
+    for (std::size_t i = 0; i < interface.gap.size(); ++i)
+      for (std::size_t k = 0; k < static_cast<std::size_t>(interface.directions); ++k)
+        if (const double c = slip_compliance_of(interface, i); c > 0)
+          TangentView<double>(friction, interface.directions).of(i)[k] =
+              -PairView(moved, interface.directions).tangential(i)[k] / c;
+    return friction;
+  };
+  const std::vector<double> re = friction_of(real, mode.real), im = friction_of(imaginary, mode.imaginary);
+  for (std::size_t i = 0; i < interface.gap.size(); ++i)
+  {
+    if (!is_undriven(interface, i) || equilibrium.history->statuses[i] != ContactStatus::stick) continue;
+    StuckPair& pair = pairs.emplace_back();
+    pair.mu = friction_coefficient(interface.friction.of(i), 0).value;
+    pair.reaction0 = PairView(equilibrium.reactions, interface.directions).vector(i);
+    pair.reaction[0] = mode.reactions[i];
+    for (std::size_t k = 0; k < static_cast<std::size_t>(interface.directions); ++k)
+      pair.reaction[k + 1] = {TangentView(re, interface.directions).of(i)[k],
+                              TangentView(im, interface.directions).of(i)[k]};
+  }
+  return pairs;
+}
+
 // (Re(phi).A Re(phi) + Im(phi).A Im(phi))
 double quadratic_form(Mat A, const ComplexMode& mode)
 {
@@ -286,7 +357,9 @@ Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedS
   const double energy = omega * omega * quadratic_form(structure.M, mode) / 2; // E/q^2
   result.damping_rate = omega * omega * quadratic_form(structure.C, mode) / 2 / energy;
   double linear = 0, scale = 0;
-  result.lift_off_amplitude = result.reversal_amplitude = infinity;
+  result.lift_off_amplitude = result.reversal_amplitude = result.slip_amplitude = infinity;
+  for (const StuckPair& pair : stuck_pairs(sliding, linearised, mode))
+    result.slip_amplitude = std::min(result.slip_amplitude, first_slip(pair));
   for (const PairMotion& pair : pairs)
   {
     linear += linear_power(pair);

@@ -59,6 +59,14 @@ struct StickSlipState
   Eigen::VectorXd r, w; // [N, m]
 };
 
+/// dr = r + R y and dw = w + W y fulfil the linearised law of a pair for all y. Force-like unknowns are scaled.
+struct LinearPairLaw
+{
+  Eigen::Vector3d r{0, 0, 0}, w{0, 0, 0};
+  Eigen::Matrix3d R = Eigen::Matrix3d::Zero(), W = Eigen::Matrix3d::Zero();
+  int forces = 0; // unknowns that are forces, whose columns have the other sign
+};
+
 /// The system of the statuses that an increment ended with, factored.
 class StatusSystem
 {
@@ -76,20 +84,11 @@ public:
   double reciprocal_condition() const; // smallest over largest pivot
 
 private:
-  /// dr = r + R y and dw = w + W y fulfil the linearised law of a pair for all y. Force-like unknowns are scaled.
-  struct PairSystem
-  {
-    Eigen::Vector3d r{0, 0, 0}, w{0, 0, 0};
-    Eigen::Matrix3d R = Eigen::Matrix3d::Zero(), W = Eigen::Matrix3d::Zero();
-    int forces = 0; // unknowns that are forces, whose columns have the other sign
-  };
-  PairSystem system_of(std::size_t pair, const StickSlipFriction& friction, const StickSlipState& at);
-  void close(PairSystem& system, std::size_t pair, const StickSlipFriction& friction, const StickSlipState& at);
   Eigen::VectorXd solution(const Eigen::VectorXd& rhs) const; // of the system
   StickSlipState spread(const Eigen::VectorXd& y) const;
 
   const StickSlipOperator& of_;
-  std::vector<PairSystem> pairs_;
+  std::vector<LinearPairLaw> pairs_;
   std::vector<ContactStatus> statuses_;
   std::vector<std::size_t> unknown_; // pairs of the system
   std::vector<Eigen::Index> rows_;   // theirs

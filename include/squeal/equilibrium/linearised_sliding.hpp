@@ -20,6 +20,7 @@ struct ClosedContact
   Owned<Mat> Z, Y;            // dofs x (dofs - rows eliminated)
   Owned<Mat> reaction;        // pairs x dofs: lambda_n = reaction f of forces f = R' lambda_n + g, g = 0 on the pivots
   Owned<Mat> normal_reaction; // the same of forces f = B_n' lambda + g
+  Owned<Mat> friction;        // tangential rows x dofs: of pairs that stick, likewise; null: no pair is without drive
   std::vector<int> pairs;     // the closed ones, ascending
   int dependent_rows = 0;     // of pairs that stick, which the other rows imply: left out
   std::vector<PetscInt> pivots; // the degrees of freedom that are eliminated, ascending

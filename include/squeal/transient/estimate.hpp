@@ -29,6 +29,7 @@ struct Estimate
   double mean_energy = 0;          // [J] E at that amplitude; compare with the cycle's mean fluctuating energy
   double lift_off_amplitude = 0;   // [m] min r_n0/|rho|; infinite where no reaction fluctuates
   double reversal_amplitude = 0;   // [m] first q at which some pair's sliding along the drive stops; or infinite
+  double slip_amplitude = 0;       // [m] at which some pair that sticks reaches its friction; infinite: none does
   double damping_rate = 0;         // P_C/E [1/s], independent of q
   double friction_rate_linear = 0; // P_R/E as q -> 0 [1/s]; friction - damping = 2 Re(lambda)
   double start_amplitude = 0; // [m] where vibrations start: the balance, or a multiple of the first event without one
