@@ -145,7 +145,7 @@ Robustness run_robustness(const Model& model, const Scene& scene, const ProgramO
   for (const UncertainNumber& number : scene.uncertain) keys.push_back(number.key);
   const auto model_at = [&](std::span<const double> values, MPI_Comm) { return models.at(numbers_of(keys, values)); };
   return find_robustness(
-      {*scene.robustness, scene.uncertain, model_at, scene.modes, options.modes, options.equilibrium},
+      {*scene.robustness, scene.uncertain, model_at, scene.modes, options.modes, options.equilibrium, scene.accuracy},
       comm_of(model.structure.load));
 }
 

@@ -319,7 +319,8 @@ SceneKeys keys_of(Scene& scene)
       {"fidelity", choice_of(scene.fidelity), "word",
        "model on which the cycle is sought; auto: what the scene leaves open is chosen as the accuracy needs it"},
       {"accuracy", &scene.accuracy, "-",
-       "relative error that fidelity = \"auto\" may leave in the cycle's frequency and mean fluctuating energy",
+       "relative error that fidelity = \"auto\" may leave in the cycle's frequency and mean fluctuating energy; "
+       "in growth rates of [robustness] over what they scatter by",
        positive},
       section("mesh", scene.mesh, "a mesh and how to read it"),
       section("matrices", scene.matrices, "matrices of another code instead of a mesh"),

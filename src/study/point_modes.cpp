@@ -285,19 +285,6 @@ bool correct(ModesBasis& modes, MultiVector residuals)
   return extend(modes.basis, product(modes.contact.Z, responses)) > 0;
 }
 
-/// All of the space joins the basis where the problem is small. Returns whether that adds anything.
-bool complete(ModesBasis& modes, const PointProblem& problem)
-{
-  PetscInt size = 0, first = 0;
-  check(MatGetSize(problem.sliding.structure.K, &size, nullptr));
-  check(MatGetOwnershipRange(problem.sliding.structure.K, &first, nullptr));
-  if (size > problem.dense_limit) return false;
-  MultiVector all{modes.basis.T.comm, MatrixXd::Zero(modes.basis.T.entries.rows(), size)};
-  all.entries.middleCols(first, all.entries.rows()).setIdentity();
-  modes.whole_up_to = 1;
-  return extend(modes.basis, std::move(all)) > 0;
-}
-
 /// The result of a point, without what is no mode.
 PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const PointMatrices& on_basis, Index shapes)
 {
@@ -404,13 +391,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
       for (const Side side : {Side::right, Side::left})
         append_residuals(modes, point, inexact(solved, problem, side), side, residuals);
     if (correct(modes, std::move(residuals))) continue;
-    const bool misses = now > 1;
-    if (misses && complete(modes, problem))
-    {
-      extent = Extent::whole;
-      continue;
-    }
-    if (extent == Extent::near_band && misses) solved = solve_projected(modes, on_basis, window, Extent::whole);
+    if (extent == Extent::near_band && now > 1) solved = solve_projected(modes, on_basis, window, Extent::whole);
     PointModes result = modes_of(solved, problem, on_basis, modes.basis.shapes());
     result.outcome.iterations = static_cast<int>(pass);
     return result;

@@ -2,6 +2,7 @@
 
 #include "robustness_summary.hpp"
 #include "squeal/algebra/lent_cores.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/random.hpp"
 #include "squeal/base/run_control.hpp"
@@ -19,10 +20,9 @@ namespace
 using Complex = std::complex<double>;
 using Eigen::Index;
 
-constexpr double vector_tolerance =
-    1e-6; // backward error of both vectors; eigenvalues are off by 1e-4 of themselves, at most
-constexpr double least_share = 0.1;  // of a reference mode in an unstable one, below which it is none of them
-constexpr std::size_t prepared = 16; // samples whose closed pairs tell those of the basis
+constexpr double loosest_tolerance = 0.01; // on backward errors: that of a frequency's square, so to speak
+constexpr double least_share = 0.1;        // of a reference mode in an unstable one, below which it is none of them
+constexpr std::size_t prepared = 16; // samples whose closed pairs tell those of the basis, and whose scatter its error
 
 /// The text of the Error of some work; empty where there is none.
 template <class Work> std::string error_of(Work work)
@@ -123,6 +123,43 @@ private:
   PointModes modes_{};
 };
 
+/// The modes of some samples, and the largest backward error of their vectors.
+struct SampledModes
+{
+  std::vector<std::vector<Complex>> lambda{}; // by samples
+  double backward_error = 0;
+};
+
+/// The largest distance of an eigenvalue in the band [Hz] from the nearest one of the other list, over its size.
+double largest_change(const SampledModes& from, const SampledModes& to, double band)
+{
+  double largest = 0;
+  for (std::size_t k = 0; k < from.lambda.size(); ++k)
+    for (const Complex lambda : from.lambda[k])
+    {
+      if (std::abs(lambda) >= two_pi * band) continue;
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const Complex other : to.lambda[k]) nearest = std::min(nearest, std::abs(other - lambda) / std::abs(lambda));
+      largest = std::max(largest, nearest);
+    }
+  return largest;
+}
+
+/// Standard deviation of the largest growth rate over |lambda| of each sample.
+double scatter_of(const SampledModes& modes)
+{
+  std::vector<double> growth;
+  for (const std::vector<Complex>& lambda : modes.lambda)
+  {
+    const auto ratio = [](Complex one) { return one.real() / std::abs(one); };
+    if (!lambda.empty()) growth.push_back(std::ranges::max(lambda | std::views::transform(ratio)));
+  }
+  const Eigen::Map<const Eigen::ArrayXd> values(growth.data(), static_cast<Index>(growth.size()));
+  return growth.size() < 2
+             ? 0
+             : std::sqrt((values - values.mean()).square().sum() / static_cast<double>(growth.size() - 1));
+}
+
 /// The points of a scene with random numbers, on a basis of one rank that they share.
 class Sampler
 {
@@ -142,6 +179,7 @@ public:
     model_.prepare(middle);
     for (const RobustSample& sample : std::span(samples).first(std::min(samples.size(), prepared)))
       model_.prepare({sample.values});
+    find_tolerance(std::span(samples).first(std::min(samples.size(), prepared)));
     (void)error_of([&] { reference_ = Reference(modes_at(middle)); });
   }
 
@@ -181,17 +219,62 @@ public:
   Index shapes() const { return model_.shapes(); }
 
 private:
-  PointModes modes_at(const SweptPlace& place)
+  /// Tightens the tolerance until the error of these samples' eigenvalues is a part of what their growth rates scatter
+  /// by. What a larger basis changes is the error on the smaller one; errors fall as the product of those of both
+  /// vectors.
+  void find_tolerance(std::span<const RobustSample> samples)
+  {
+    SampledModes coarse = modes_of(samples);
+    while (tolerance_ > close_tolerance)
+    {
+      const Index shapes = model_.shapes();
+      tolerance_ = std::max(close_tolerance, tolerance_ / 10);
+      SampledModes fine = modes_of(samples);
+      const double reduction = std::pow(fine.backward_error / coarse.backward_error, 2);
+      if (model_.shapes() > shapes &&
+          largest_change(coarse, fine, problem_.modes.band) * reduction <= problem_.accuracy * scatter_of(fine))
+        return;
+      coarse = std::move(fine);
+    }
+  }
+
+  /// Empty where a sample has none.
+  SampledModes modes_of(std::span<const RobustSample> samples)
+  {
+    SampledModes found;
+    for (const RobustSample& sample : samples)
+    {
+      std::vector<Complex>& lambda = found.lambda.emplace_back();
+      (void)error_of(
+          [&]
+          {
+            const PointModes modes = followed_modes_at({sample.values});
+            for (const TwoSidedPair& pair : modes.pairs) lambda.push_back(pair.lambda);
+            found.backward_error = std::max(found.backward_error, modes.outcome.residual);
+          });
+    }
+    return found;
+  }
+
+  /// Up to a little beyond the band.
+  PointModes followed_modes_at(const SweptPlace& place)
   {
     need(model_.equilibrium_at(place).outcome);
-    PointModes modes = model_.modes_at(place, vector_tolerance);
+    PointModes modes = model_.modes_at(place, tolerance_);
     need(modes.outcome);
+    return modes;
+  }
+
+  PointModes modes_at(const SweptPlace& place)
+  {
+    PointModes modes = followed_modes_at(place);
     std::erase_if(modes.pairs, [&](const TwoSidedPair& pair) { return !in_band(pair, problem_.modes.band); });
     return modes;
   }
 
   const RobustnessProblem& problem_;
   SweptModel model_;
+  double tolerance_ = loosest_tolerance; // on the backward errors of both vectors
   Reference reference_{};
 };
 

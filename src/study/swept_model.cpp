@@ -99,11 +99,8 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
       trained_.clear(); // their vectors are on the basis before
     }
     if (auto known = trained_.extract(place)) return std::move(known.mapped());
-    modes = find_point_modes(*basis_, {{model_->structure, model_->interface, equilibrium},
-                                       problem_.modes.band,
-                                       tolerance,
-                                       problem_.modes_options.dense_limit,
-                                       end_if_asked_});
+    modes = find_point_modes(
+        *basis_, {{model_->structure, model_->interface, equilibrium}, problem_.modes.band, tolerance, end_if_asked_});
   }
   catch (const LibraryError&)
   {

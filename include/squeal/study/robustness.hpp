@@ -71,6 +71,7 @@ struct RobustnessProblem
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;
+  double accuracy = 0; // of growth rates over |lambda|, as a part of their scatter
 };
 
 /// Every rank computes samples of its own. Collective.
