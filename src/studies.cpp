@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 namespace squeal
 {
@@ -78,6 +79,46 @@ Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const
   return attractors({std::span(modes).subspan(followed, 1), std::span(&estimate, 1)});
 }
 
+namespace
+{
+
+/// The stability of sliding at the scene's own value and at others spread evenly over the range of its branch.
+SlidingStability stability_beside_branch(NearbyModels& models, const Scene& scene, const ProgramOptions& options)
+{
+  constexpr int intervals = 10;
+  const BranchSettings& branch = *scene.branch;
+  std::set<double> values = {branch.own};
+  for (int i = 0; i <= intervals; ++i) values.insert(branch.from + i * (branch.to - branch.from) / intervals);
+  SweepSettings settings;
+  settings.key = {branch.key};
+  settings.values.assign(values.begin(), values.end());
+  settings.directions = SweepDirections::one;
+  const auto model_at = [&](std::span<const double> value, MPI_Comm)
+  { return models.at(numbers_of(settings.key, value)); };
+  const SweepOptions together{.groups = 1};
+  const Sweep sweep =
+      run_sweep({settings, model_at, {}, scene.modes, options.modes, options.equilibrium, together}, models.comm());
+  if (sweep.outcome.kind == OutcomeKind::interrupted) throw Interrupted{};
+  SlidingStability stability;
+  for (const SweepPoint& point : sweep.points)
+  {
+    if (point.inserted) continue;
+    EquilibriumStability& at = stability.equilibria.emplace_back(point.values[0]);
+    at.known = point.outcome.kind == OutcomeKind::converged;
+    at.unstable_modes = point.unstable;
+    const auto least_stable = std::ranges::find_if(point.modes, [](const SweptMode& m) { return m.lambda.imag() > 0; });
+    if (least_stable == point.modes.end()) continue;
+    at.growth_rate = least_stable->lambda.real();
+    at.frequency_hz = frequency_hz_of(least_stable->lambda);
+  }
+  for (const Threshold& at : sweep.thresholds)
+    if (at.frequency_hz > 0)
+      stability.hopf.push_back({BranchEventKind::hopf, at.values[0], at.error, 1 / at.frequency_hz, 0, at.change});
+  return stability;
+}
+
+} // namespace
+
 BrakeBranch run_branch(const SlidingPoint& point, const Motion& motion, const Scene& scene,
                        const ProgramOptions& options)
 {
@@ -89,8 +130,8 @@ BrakeBranch run_branch(const SlidingPoint& point, const Motion& motion, const Sc
   const auto model_at = [&](double parameter) {
     return models.at(std::array{SceneNumber{scene.branch->key, parameter}});
   };
-  return find_branch({*scene.branch, model_at, point.sliding(), motion.cycle, point.modes.modes,
-                      point.modes.modes[motion.followed.index], scene.fidelity,
+  return find_branch({*scene.branch, model_at, point.sliding(), stability_beside_branch(models, scene, options),
+                      motion.cycle, point.modes.modes, point.modes.modes[motion.followed.index], scene.fidelity,
                       steps_along_branch(scene.cycle, motion.cycle), tolerance, point.model->probes, scene.modes,
                       options.modes, options.equilibrium, options.step, options.cycle.shooting});
 }

@@ -1,6 +1,5 @@
 #include "squeal/branch/brake_branch.hpp"
 
-#include "equilibrium_stability.hpp"
 #include "reduced_family.hpp"
 
 #include "squeal/algebra/dense_matrix.hpp"
@@ -105,20 +104,34 @@ std::vector<Place> places_along(const Branch& branch)
   return places;
 }
 
+/// The number of unstable modes at a value, from those at the values around it and the Hopf points between them; -1:
+/// not known.
+int unstable_modes_at(double parameter, const SlidingStability& stability)
+{
+  const EquilibriumStability* below = nullptr;
+  for (const EquilibriumStability& equilibrium : stability.equilibria)
+    if (equilibrium.known && equilibrium.parameter <= parameter) below = &equilibrium;
+  if (!below) return -1;
+  int count = below->unstable_modes;
+  for (const BranchEvent& hopf : stability.hopf)
+    if (hopf.parameter > below->parameter && hopf.parameter <= parameter) count += hopf.change;
+  return count;
+}
+
 /// Where a stable cycle stands beside a stable equilibrium: ranges of successive places, up to the Hopf point between
 /// stable cycles.
-std::vector<ParameterRange> coexistence_of(const BrakeBranch& found, const std::vector<BranchEvent>& hopf)
+std::vector<ParameterRange> coexistence_of(const Branch& branch, const SlidingStability& stability)
 {
   std::vector<ParameterRange> ranges;
   std::optional<double> before; // a stable cycle
   bool open = false;
-  for (const Place& place : places_along(found.branch))
+  for (const Place& place : places_along(branch))
   {
-    const bool both = place.stable && unstable_modes_at(place.parameter, found.equilibria, hopf) == 0;
+    const bool both = place.stable && unstable_modes_at(place.parameter, stability) == 0;
     if (both && !open) ranges.push_back({place.parameter, place.parameter});
     if (both) widen(ranges.back(), place.parameter);
     if (both != open && place.stable && before)
-      for (const BranchEvent& event : hopf)
+      for (const BranchEvent& event : stability.hopf)
         if ((event.parameter - *before) * (event.parameter - place.parameter) < 0)
           widen(ranges.back(), event.parameter);
     before = place.stable ? std::optional(place.parameter) : std::nullopt;
@@ -327,15 +340,14 @@ BrakeBranch find_branch(const BrakeBranchProblem& problem)
                                           settings.points, problem.tolerance, problem.steps_per_period};
   BrakeFamily family(problem);
   BrakeBranch found;
-  found.equilibria = equilibria_along(family, problem);
-  std::vector<BranchEvent> hopf = hopf_points(family, problem, found.equilibria);
-  family.set_parameter(problem.settings.own);
+  found.equilibria = problem.stability.equilibria;
   if (!try_reduced_model(family, problem, continuation, found))
     found.branch =
         trace_branch(family.flows(), continuation, problem.shooting, problem.cycle.orbit, problem.settings.own);
-  found.coexistence = coexistence_of(found, hopf);
+  found.coexistence = coexistence_of(found.branch, problem.stability);
   if (found.outcome.kind == OutcomeKind::refused) return found;
   found.outcome = outcome_of(problem, found);
+  const std::vector<BranchEvent>& hopf = problem.stability.hopf;
   found.branch.events.insert(found.branch.events.begin(), hopf.begin(), hopf.end());
   return found;
 }

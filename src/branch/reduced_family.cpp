@@ -1,7 +1,5 @@
 #include "reduced_family.hpp"
 
-#include "equilibrium_stability.hpp"
-
 #include "squeal/base/run_control.hpp"
 #include "squeal/cycle/reduced_spectrum.hpp"
 
@@ -26,10 +24,37 @@ void need(const Outcome& outcome, const char* what, const BrakeBranchProblem& pr
     throw Error(format("the scene with %s = %.6g has no %s", problem.settings.key.c_str(), parameter, what));
 }
 
+/// The modes of the band at an equilibrium of the range.
+Modes modes_at(const SlidingEquilibrium& sliding, const BrakeBranchProblem& problem)
+{
+  ModesSettings settings = problem.modes;
+  if (settings.method != ModesMethod::projection) settings.method = ModesMethod::full; // which decides there
+  return find_modes(sliding, linearise(sliding), settings, problem.modes_options);
+}
+
+constexpr std::size_t parts_of_motion = 8; // of the list below, those that motion depends on
+
 /// What one polynomial in the parameter stands for.
-constexpr std::array matrix_parts = {&ReducedModel::M, &ReducedModel::C,   &ReducedModel::K,  &ReducedModel::H,
-                                     &ReducedModel::G, &ReducedModel::M_z, &ReducedModel::K_z};
-constexpr std::array list_parts = {&ReducedModel::compliance, &ReducedModel::drive};
+std::vector<Eigen::Map<VectorXd>> parts_of(ReducedBrake& brake)
+{
+  ReducedModel& model = brake.model;
+  std::vector<Eigen::Map<VectorXd>> parts;
+  for (MatrixXd* const matrix : {&model.M, &model.C, &model.K, &model.H, &model.G, &model.M_z, &model.K_z})
+    parts.emplace_back(matrix->data(), matrix->size());
+  for (VectorXd* const vector : {&model.force, &brake.rest, &brake.pull})
+    parts.emplace_back(vector->data(), vector->size());
+  for (std::vector<double>* const list : {&model.compliance, &model.drive})
+    parts.emplace_back(list->data(), static_cast<Index>(list->size()));
+  const auto add_law = [&](FrictionLaw& law)
+  {
+    for (double* const number : {&law.coefficient, &law.static_coefficient, &law.decay_speed})
+      parts.emplace_back(number, 1);
+  };
+  add_law(model.friction.common);
+  for (FrictionLaw& law : model.friction.own) add_law(law);
+  parts.emplace_back(&brake.energy, 1);
+  return parts;
+}
 
 /// Weights of the samples at a value: the polynomial through Chebyshev points of the second kind (Berrut and Trefethen
 /// 2004, eq. 4.2 and 5.4).
@@ -53,55 +78,26 @@ std::vector<double> weights_at(const std::vector<double>& nodes, double paramete
   return weights;
 }
 
-ReducedBrake combined(const std::vector<ReducedBrake>& samples, const std::vector<double>& weights)
+ReducedBrake combined(std::vector<ReducedBrake>& samples, const std::vector<double>& weights)
 {
-  const auto nearest = std::max_element(weights.begin(), weights.end()) - weights.begin();
-  const ReducedBrake& like = samples[static_cast<std::size_t>(nearest)];
-  const auto sum = [&](const auto& part)
+  ReducedBrake result = samples[static_cast<std::size_t>(std::ranges::max_element(weights) - weights.begin())];
+  const std::vector<Eigen::Map<VectorXd>> sums = parts_of(result);
+  for (Eigen::Map<VectorXd> sum : sums) sum.setZero();
+  for (std::size_t i = 0; i < samples.size(); ++i)
   {
-    std::decay_t<decltype(part(like))> total = weights[0] * part(samples[0]);
-    for (std::size_t i = 1; i < samples.size(); ++i) total += weights[i] * part(samples[i]);
-    return total;
-  };
-  ReducedBrake result;
-  ReducedModel& model = result.model;
-  for (const auto part : matrix_parts)
-    model.*part = sum([part](const ReducedBrake& b) -> const MatrixXd& { return b.model.*part; });
-  for (const auto part : list_parts)
-  {
-    const VectorXd values =
-        sum([part](const ReducedBrake& b)
-            { return VectorXd(VectorXd::Map((b.model.*part).data(), static_cast<Index>((b.model.*part).size()))); });
-    (model.*part).assign(values.begin(), values.end());
+    const std::vector<Eigen::Map<VectorXd>> parts = parts_of(samples[i]);
+    for (std::size_t k = 0; k < sums.size(); ++k) Eigen::Map<VectorXd>(sums[k]) += weights[i] * parts[k];
   }
-  model.force = sum([](const ReducedBrake& b) -> const VectorXd& { return b.model.force; });
-  model.friction = like.model.friction;
-  const auto set_law = [&](FrictionLaw& law, const auto& of)
-  {
-    for (const auto part : {&FrictionLaw::coefficient, &FrictionLaw::static_coefficient, &FrictionLaw::decay_speed})
-      law.*part = sum([&](const ReducedBrake& b) { return of(b.model.friction).*part; });
-  };
-  set_law(model.friction.common, [](const PairFriction& f) -> const FrictionLaw& { return f.common; });
-  for (std::size_t k = 0; k < model.friction.own.size(); ++k)
-    set_law(model.friction.own[k], [k](const PairFriction& f) -> const FrictionLaw& { return f.own[k]; });
-  model.active = like.model.active;
-  model.directions = like.model.directions;
-  model.gap = like.model.gap;
-  model.reactions = like.model.reactions;
-  model.omega = like.model.omega;
-  model.slow = like.model.slow;
-  result.rest = sum([](const ReducedBrake& b) -> const VectorXd& { return b.rest; });
-  result.pull = sum([](const ReducedBrake& b) -> const VectorXd& { return b.pull; });
-  result.energy = sum([](const ReducedBrake& b) { return b.energy; });
   return result;
 }
 
 /// The largest relative distance between the parts that motion depends on.
-double distance(const ReducedModel& found, const ReducedModel& exact)
+double distance(ReducedBrake& found, ReducedBrake& exact)
 {
-  double largest = (found.force - exact.force).norm() / std::max(exact.force.norm(), 1e-300);
-  for (const auto part : matrix_parts)
-    largest = std::max(largest, (found.*part - exact.*part).norm() / std::max((exact.*part).norm(), 1e-300));
+  const std::vector<Eigen::Map<VectorXd>> a = parts_of(found), b = parts_of(exact);
+  double largest = 0;
+  for (std::size_t k = 0; k < parts_of_motion; ++k)
+    largest = std::max(largest, (a[k] - b[k]).norm() / std::max(b[k].norm(), 1e-300));
   return largest;
 }
 
@@ -286,8 +282,9 @@ void ReducedFamily::take_samples(BrakeFamily& full)
       nodes.push_back(node(i, intervals));
       const bool known = !samples_.empty() && i % 2 == 0;
       samples.push_back(known ? samples_[static_cast<std::size_t>(i / 2)] : sample(full, nodes.back()));
-      if (!known && !samples_.empty())
-        error = std::max(error, distance(interpolated(nodes.back()).model, samples.back().model));
+      if (known || samples_.empty()) continue;
+      ReducedBrake between = interpolated(nodes.back());
+      error = std::max(error, distance(between, samples.back()));
     }
     nodes_ = std::move(nodes);
     samples_ = std::move(samples);
@@ -296,7 +293,7 @@ void ReducedFamily::take_samples(BrakeFamily& full)
   }
 }
 
-ReducedBrake ReducedFamily::interpolated(double parameter) const
+ReducedBrake ReducedFamily::interpolated(double parameter)
 {
   return combined(samples_, weights_at(nodes_, parameter));
 }

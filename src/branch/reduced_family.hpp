@@ -68,7 +68,7 @@ private:
 
   void check_shapes_fit(const Interface& other) const; // Error: they do not
   ReducedBrake sample(BrakeFamily& full, double parameter);
-  ReducedBrake interpolated(double parameter) const;
+  ReducedBrake interpolated(double parameter);
   void take_samples(BrakeFamily& full);
   SlowMotions slow_motions(double period, Vec start);
   PointMeasures measure(const Orbit& orbit);

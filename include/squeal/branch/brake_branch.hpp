@@ -15,11 +15,17 @@ namespace squeal
 struct EquilibriumStability
 {
   double parameter = 0;
-  bool known = false;                                // there is an equilibrium, and its modes converged
-  int unstable_modes = 0;                            // in the band
-  double growth_rate = 0;                            // [1/s] of the least stable mode that oscillates
-  double frequency_hz = 0;                           // of that mode
-  std::vector<double> growth_rates{}, frequencies{}; // of all, falling growth rate
+  bool known = false;      // there is an equilibrium, and its modes converged
+  int unstable_modes = 0;  // in the band
+  double growth_rate = 0;  // [1/s] of the least stable mode that oscillates
+  double frequency_hz = 0; // of that mode
+};
+
+/// The stability of sliding beside a branch.
+struct SlidingStability
+{
+  std::vector<EquilibriumStability> equilibria{}; // by rising parameter
+  std::vector<BranchEvent> hopf{};                // where modes become unstable or stable, with the frequency of each
 };
 
 /// A range of the parameter.
@@ -62,6 +68,7 @@ struct BrakeBranchProblem
   const BranchSettings& settings;
   std::function<BrakeModel(double parameter)> model_at; // with matrices of the layout of the scene's own
   SlidingEquilibrium sliding;                           // of the scene itself
+  SlidingStability stability;                           // along the range
   const LimitCycle& cycle;                              // where the branch starts
   const std::vector<ComplexMode>& own_modes;            // of the scene
   const ComplexMode& followed;                          // of these, by the cycle
