@@ -335,6 +335,21 @@ MultiVector dynamic_forces(const SlidingBasis& basis, const LinearisedPoint& poi
   return product(test, force);
 }
 
+MultiVector dense_columns(Mat A)
+{
+  PetscInt first = 0, rows = 0, columns = 0;
+  check(MatGetOwnershipRange(A, &first, nullptr));
+  check(MatGetLocalSize(A, &rows, nullptr));
+  check(MatGetSize(A, nullptr, &columns));
+  MultiVector result{comm_of(A), MatrixXd::Zero(rows, columns)};
+  for_each_row(A,
+               [&](PetscInt row, std::span<const PetscInt> places, std::span<const PetscScalar> values)
+               {
+                 for (std::size_t k = 0; k < places.size(); ++k) result.entries(row - first, places[k]) = values[k];
+               });
+  return result;
+}
+
 MultiVector kept_rows(const MultiVector& x, const ClosedContact& contact)
 {
   return {x.comm, x.entries(rows_kept(contact, x.entries.rows()), Eigen::all)};

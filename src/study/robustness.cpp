@@ -131,7 +131,7 @@ struct SampledModes
 };
 
 /// The largest distance of an eigenvalue in the band [Hz] from the nearest one of the other list, over its size.
-double largest_change(const SampledModes& from, const SampledModes& to, double band)
+double largest_shift(const SampledModes& from, const SampledModes& to, double band)
 {
   double largest = 0;
   for (std::size_t k = 0; k < from.lambda.size(); ++k)
@@ -232,7 +232,7 @@ private:
       SampledModes fine = modes_of(samples);
       const double reduction = std::pow(fine.backward_error / coarse.backward_error, 2);
       if (model_.shapes() > shapes &&
-          largest_change(coarse, fine, problem_.modes.band) * reduction <= problem_.accuracy * scatter_of(fine))
+          largest_shift(coarse, fine, problem_.modes.band) * reduction <= problem_.accuracy * scatter_of(fine))
         return;
       coarse = std::move(fine);
     }
