@@ -6,6 +6,7 @@
 #include "squeal/modes/quadratic.hpp"
 
 #include <algorithm>
+#include <ranges>
 
 namespace squeal
 {
@@ -231,6 +232,19 @@ std::vector<Index> local_pivots(const ClosedContact& contact)
   return rows;
 }
 
+namespace
+{
+
+/// Of so many local rows, those of no pivot.
+std::vector<Index> rows_kept(const ClosedContact& contact, Index rows)
+{
+  std::vector<Index> kept;
+  std::ranges::set_difference(std::views::iota(Index{0}, rows), local_pivots(contact), std::back_inserter(kept));
+  return kept;
+}
+
+} // namespace
+
 LinearisedPoint linearise_point(const SlidingEquilibrium& sliding)
 {
   const auto& [structure, interface, equilibrium] = sliding;
@@ -321,33 +335,31 @@ MultiVector dynamic_forces(const SlidingBasis& basis, const LinearisedPoint& poi
   return product(test, force);
 }
 
+MultiVector dense_columns(Mat A)
+{
+  PetscInt first = 0, rows = 0, columns = 0;
+  check(MatGetOwnershipRange(A, &first, nullptr));
+  check(MatGetLocalSize(A, &rows, nullptr));
+  check(MatGetSize(A, nullptr, &columns));
+  MultiVector result{comm_of(A), MatrixXd::Zero(rows, columns)};
+  for_each_row(A,
+               [&](PetscInt row, std::span<const PetscInt> places, std::span<const PetscScalar> values)
+               {
+                 for (std::size_t k = 0; k < places.size(); ++k) result.entries(row - first, places[k]) = values[k];
+               });
+  return result;
+}
+
 MultiVector kept_rows(const MultiVector& x, const ClosedContact& contact)
 {
-  const std::vector<Index> pivots = local_pivots(contact);
-  MultiVector kept{x.comm, MatrixXd(x.entries.rows() - static_cast<Index>(pivots.size()), x.columns())};
-  Index next = 0, to = 0;
-  for (std::size_t k = 0; k <= pivots.size(); ++k)
-  {
-    const Index end = k < pivots.size() ? pivots[k] : x.entries.rows();
-    kept.entries.middleRows(to, end - next) = x.entries.middleRows(next, end - next);
-    to += end - next;
-    next = end + 1;
-  }
-  return kept;
+  return {x.comm, x.entries(rows_kept(contact, x.entries.rows()), Eigen::all)};
 }
 
 MultiVector with_zero_pivots(const MultiVector& kept, const ClosedContact& contact)
 {
-  const std::vector<Index> pivots = local_pivots(contact);
-  MultiVector x{kept.comm, MatrixXd::Zero(kept.entries.rows() + static_cast<Index>(pivots.size()), kept.columns())};
-  Index next = 0, from = 0;
-  for (std::size_t k = 0; k <= pivots.size(); ++k)
-  {
-    const Index end = k < pivots.size() ? pivots[k] : x.entries.rows();
-    x.entries.middleRows(next, end - next) = kept.entries.middleRows(from, end - next);
-    from += end - next;
-    next = end + 1;
-  }
+  const Index pivots = std::ssize(local_pivots(contact));
+  MultiVector x{kept.comm, MatrixXd::Zero(kept.entries.rows() + pivots, kept.columns())};
+  x.entries(rows_kept(contact, x.entries.rows()), Eigen::all) = kept.entries;
   return x;
 }
 

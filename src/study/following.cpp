@@ -31,17 +31,22 @@ MatrixXcd padded(const PointModes& point, Eigen::VectorXcd TwoSidedPair::*side, 
   return result;
 }
 
+/// (lambda_i + lambda_j) left_i'M right_j of those products.
+MatrixXcd form(const std::vector<TwoSidedPair>& lefts, const std::vector<TwoSidedPair>& rights, MatrixXcd products)
+{
+  for (Index i = 0; i < products.rows(); ++i)
+    for (Index j = 0; j < products.cols(); ++j)
+      products(i, j) *= lefts[static_cast<std::size_t>(i)].lambda + rights[static_cast<std::size_t>(j)].lambda;
+  return products;
+}
+
 /// left_i'((lambda_i + lambda_j) M + C) right_j: zero between different modes of one point.
 MatrixXcd form(const PointModes& lefts, const PointModes& rights, const PointModes& matrices)
 {
   const Index rows = matrices.M.rows();
   const MatrixXcd left = padded(lefts, &TwoSidedPair::left, rows), right = padded(rights, &TwoSidedPair::right, rows);
-  MatrixXcd result = left.transpose() * real_times(matrices.M, right);
-  for (Index i = 0; i < result.rows(); ++i)
-    for (Index j = 0; j < result.cols(); ++j)
-      result(i, j) *=
-          lefts.pairs[static_cast<std::size_t>(i)].lambda + rights.pairs[static_cast<std::size_t>(j)].lambda;
-  return result + left.transpose() * real_times(matrices.C, right);
+  return form(lefts.pairs, rights.pairs, left.transpose() * real_times(matrices.M, right)) +
+         left.transpose() * real_times(matrices.C, right);
 }
 
 /// left'A right of vectors given by their real, then their imaginary parts.
@@ -59,12 +64,7 @@ MatrixXcd bilinear(const MultiVector& left, const MultiVector& A_right)
 MatrixXcd form(const ExpandedModes& lefts, const ExpandedModes& rights, const MultiVector& M_right,
                const MultiVector& C_right)
 {
-  MatrixXcd result = bilinear(lefts.left, M_right);
-  for (Index i = 0; i < result.rows(); ++i)
-    for (Index j = 0; j < result.cols(); ++j)
-      result(i, j) *=
-          lefts.pairs[static_cast<std::size_t>(i)].lambda + rights.pairs[static_cast<std::size_t>(j)].lambda;
-  return result + bilinear(lefts.left, C_right);
+  return form(lefts.pairs, rights.pairs, bilinear(lefts.left, M_right)) + bilinear(lefts.left, C_right);
 }
 
 /// The MAC of two subspaces: the least modulus of the eigenvalues of first^-1 there second^-1 back, which are 1 for

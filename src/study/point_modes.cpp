@@ -75,16 +75,8 @@ void attach(ModesBasis& modes, const Interface& interface, const std::vector<int
       modes.attached[i] = 1;
     }
   if (pairs.empty()) return;
-  const Owned<Mat> forces = transpose_of(rows_of(interface, pairs, RowsTaken::normal));
-  MultiVector columns{comm_of(forces), MatrixXd::Zero(modes.basis.T.entries.rows(), static_cast<Index>(pairs.size()))};
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(forces, &first, &last));
-  for_each_row(forces,
-               [&](PetscInt row, std::span<const PetscInt> column, std::span<const PetscScalar> value)
-               {
-                 for (std::size_t k = 0; k < column.size(); ++k) columns.entries(row - first, column[k]) = value[k];
-               });
-  const MultiVector responses = modes.pencil.factor->solve(product(modes.Z_transposed, columns));
+  const MultiVector forces = dense_columns(transpose_of(rows_of(interface, pairs, RowsTaken::normal)));
+  const MultiVector responses = modes.pencil.factor->solve(product(modes.Z_transposed, forces));
   extend(modes.basis, product(modes.contact.Z, responses));
 }
 

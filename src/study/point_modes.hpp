@@ -72,6 +72,11 @@ MultiVector expanded(const ModesBasis& modes, const ClosedContact& contact, cons
 /// The backward error of vectors that are exact.
 inline constexpr double exact_tolerance = 1e-10;
 
+/// Backward errors that studies ask for at most. The error of an eigenvalue is the product of those of both vectors,
+/// magnified by its nearness to others and by what the matrices are larger than on the modes: these leave the
+/// eigenvalues of 5395 degrees of freedom within 3e-10 of those at 1e-10, in 14 instead of 49 s.
+inline constexpr double close_tolerance = 1e-8;
+
 /// Error: a closed pair that friction jams. The closed pairs include those of the basis.
 PointModes find_point_modes(ModesBasis& basis, const PointProblem& problem);
 

@@ -61,25 +61,9 @@ struct Equations
 /// Unit forces at probes on the kept degrees of freedom: basis'p.
 UnitForces unit_forces(Mat probes, const std::vector<int>& rows, Mat basis)
 {
-  UnitForces forces{empty_multivector(basis)};
-  for (const int row : rows)
-  {
-    Owned<Vec> unit, force, kept;
-    check(MatCreateVecs(probes, force.put(), unit.put()));
-    check(MatCreateVecs(basis, kept.put(), nullptr));
-    PetscInt first = 0, last = 0;
-    check(VecGetOwnershipRange(unit, &first, &last));
-    if (row >= first && row < last) check(VecSetValue(unit, row, 1, INSERT_VALUES));
-    check(VecAssemblyBegin(unit));
-    check(VecAssemblyEnd(unit));
-    check(MatMultTranspose(probes, unit, force));
-    check(MatMultTranspose(basis, force, kept));
-    double size = 0;
-    check(VecNorm(force, NORM_2, &size));
-    append(forces.columns, kept);
-    forces.sizes.push_back(size);
-  }
-  return forces;
+  const MultiVector all = dense_columns(transpose_of(probes)), p{all.comm, all.entries(Eigen::all, rows)};
+  const Eigen::VectorXd sizes = column_norms(p);
+  return {product(transpose_of(basis), p), {sizes.begin(), sizes.end()}};
 }
 
 std::vector<int> all_rows(Mat probes)
@@ -91,20 +75,15 @@ std::vector<int> all_rows(Mat probes)
   return rows;
 }
 
-/// The known modes that oscillate, each turned in phase such that its real part is as large as can be.
+/// The known modes that oscillate.
 KnownModes known_modes(std::span<const ComplexMode> modes, const ClosedContact& contact)
 {
   KnownModes known{{}, empty_multivector(contact.Z)};
   for (const ComplexMode& mode : modes)
   {
     if (!(mode.lambda.imag() > 0)) continue;
-    const MultiVector whole = columns_of(std::array{mode.real.get(), mode.imaginary.get()});
-    MultiVector parts = kept_rows(whole, contact);
-    const MatrixXd products = inner_products(parts, parts);
-    const double turn = -std::atan2(2 * products(0, 1), products(0, 0) - products(1, 1)) / 2;
-    MatrixXd rotation(2, 2);
-    rotation << std::cos(turn), std::sin(turn), -std::sin(turn), std::cos(turn);
-    parts = combination(parts, rotation / std::sqrt(products.trace()));
+    MultiVector parts = kept_rows(columns_of(std::array{mode.real.get(), mode.imaginary.get()}), contact);
+    parts.entries /= column_norms(parts).norm();
     append(known.shapes, parts);
     known.lambda.push_back(mode.lambda);
   }

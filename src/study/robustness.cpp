@@ -2,6 +2,7 @@
 
 #include "robustness_summary.hpp"
 #include "squeal/algebra/lent_cores.hpp"
+#include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/random.hpp"
 #include "squeal/base/run_control.hpp"
@@ -129,13 +130,14 @@ struct SampledModes
   double backward_error = 0;
 };
 
-/// The largest distance of an eigenvalue from the nearest one of the other list, over its size.
-double largest_change(const SampledModes& from, const SampledModes& to)
+/// The largest distance of an eigenvalue in the band [Hz] from the nearest one of the other list, over its size.
+double largest_shift(const SampledModes& from, const SampledModes& to, double band)
 {
   double largest = 0;
   for (std::size_t k = 0; k < from.lambda.size(); ++k)
     for (const Complex lambda : from.lambda[k])
     {
+      if (std::abs(lambda) >= two_pi * band) continue;
       double nearest = std::numeric_limits<double>::infinity();
       for (const Complex other : to.lambda[k]) nearest = std::min(nearest, std::abs(other - lambda) / std::abs(lambda));
       largest = std::max(largest, nearest);
@@ -223,13 +225,14 @@ private:
   void find_tolerance(std::span<const RobustSample> samples)
   {
     SampledModes coarse = modes_of(samples);
-    while (tolerance_ > exact_tolerance)
+    while (tolerance_ > close_tolerance)
     {
       const Index shapes = model_.shapes();
-      tolerance_ /= 10;
+      tolerance_ = std::max(close_tolerance, tolerance_ / 10);
       SampledModes fine = modes_of(samples);
       const double reduction = std::pow(fine.backward_error / coarse.backward_error, 2);
-      if (model_.shapes() > shapes && largest_change(coarse, fine) * reduction <= problem_.accuracy * scatter_of(fine))
+      if (model_.shapes() > shapes &&
+          largest_shift(coarse, fine, problem_.modes.band) * reduction <= problem_.accuracy * scatter_of(fine))
         return;
       coarse = std::move(fine);
     }
@@ -245,7 +248,7 @@ private:
       (void)error_of(
           [&]
           {
-            const PointModes modes = modes_at({sample.values});
+            const PointModes modes = followed_modes_at({sample.values});
             for (const TwoSidedPair& pair : modes.pairs) lambda.push_back(pair.lambda);
             found.backward_error = std::max(found.backward_error, modes.outcome.residual);
           });
@@ -253,11 +256,18 @@ private:
     return found;
   }
 
-  PointModes modes_at(const SweptPlace& place)
+  /// Up to a little beyond the band.
+  PointModes followed_modes_at(const SweptPlace& place)
   {
     need(model_.equilibrium_at(place).outcome);
     PointModes modes = model_.modes_at(place, tolerance_);
     need(modes.outcome);
+    return modes;
+  }
+
+  PointModes modes_at(const SweptPlace& place)
+  {
+    PointModes modes = followed_modes_at(place);
     std::erase_if(modes.pairs, [&](const TwoSidedPair& pair) { return !in_band(pair, problem_.modes.band); });
     return modes;
   }

@@ -20,11 +20,9 @@ namespace squeal
 namespace
 {
 
-/// Backward errors. The error of an eigenvalue is the product of those of both vectors, magnified by its nearness to
-/// others and by what the matrices are larger than on the modes. Those of 1e-8 leave the eigenvalues of 5395 degrees of
-/// freedom within 3e-10 of those at 1e-10, in 14 instead of 49 s. Where points are dear, and at those put in between,
-/// those of 1e-6 leave them within 3e-5, half of those of 33 224 within 7e-8.
-constexpr double tolerance_of_basis = 1e-8, large_tolerance = 1e-6;
+/// Backward errors where points are dear, and at those put in between: they leave eigenvalues within 3e-5, half of
+/// those of 33 224 degrees of freedom within 7e-8.
+constexpr double large_tolerance = 1e-6;
 constexpr double threshold_tolerance = 1e-5; // of the number's larger end
 constexpr int most_halvings = 6;             // of a step
 constexpr PetscInt most_between = 100;       // points put into a step where modes are unclear or pairs open or close
@@ -141,7 +139,7 @@ private:
   static double tolerance_on(const Structure& structure)
   {
     constexpr double of_point = 3000; // products, for its modes
-    return of_point * work_of_step(structure) > affordable_work ? large_tolerance : tolerance_of_basis;
+    return of_point * work_of_step(structure) > affordable_work ? large_tolerance : close_tolerance;
   }
 
   /// Points put in between tell which mode goes where, and where it changes its stability. Each is in a state of
@@ -429,7 +427,7 @@ private:
   const MPI_Comm comm_;
   SweptModel model_;
   Sweep sweep_;
-  double tolerance_ = tolerance_of_basis;
+  double tolerance_ = close_tolerance;
   std::optional<Progress> progress_;
   std::array<std::optional<Followed>, 2> starts_{}; // of the last line in either direction of rotation
   std::size_t done_ = 0;                            // points

@@ -34,15 +34,18 @@ void SweptModel::go_to(const SweptPlace& place)
   at_ = place;
 }
 
-const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
+const SweptModel::Known& SweptModel::known_at(const SweptPlace& place)
 {
-  const auto known = equilibria_.find(place);
-  if (known != equilibria_.end()) return known->second;
-  Equilibrium equilibrium;
+  const auto found = known_.find(place);
+  if (found != known_.end()) return found->second;
+  Known known;
   try
   {
     go_to(place);
-    equilibrium = searched_.at(model_->structure, model_->interface);
+    known.equilibrium = searched_.at(model_->structure, model_->interface);
+    known.rigid = known.equilibrium.closed;
+    for (std::size_t i = 0; i < known.rigid.size(); ++i)
+      known.rigid[i] = known.rigid[i] && compliance_of(model_->interface, i) == 0;
   }
   catch (const LibraryError&)
   {
@@ -51,25 +54,15 @@ const Equilibrium& SweptModel::equilibrium_at(const SweptPlace& place)
   catch (const Error& error)
   {
     model_.reset();
-    equilibrium.outcome = {OutcomeKind::no_equilibrium, error.what(), 0, 1};
+    known.equilibrium.outcome = {OutcomeKind::no_equilibrium, error.what(), 0, 1};
   }
-  return equilibria_[place] = std::move(equilibrium);
-}
-
-const std::vector<char>& SweptModel::rigid_at(const SweptPlace& place)
-{
-  const auto known = rigid_.find(place);
-  if (known != rigid_.end()) return known->second;
-  std::vector<char> rigid = equilibrium_at(place).closed;
-  go_to(place);
-  for (std::size_t i = 0; i < rigid.size(); ++i) rigid[i] = rigid[i] && compliance_of(model_->interface, i) == 0;
-  return rigid_[place] = std::move(rigid);
+  return known_[place] = std::move(known);
 }
 
 void SweptModel::prepare(const SweptPlace& place)
 {
   if (equilibrium_at(place).outcome.kind != OutcomeKind::converged) return;
-  const std::vector<char>& rigid = rigid_at(place);
+  const std::vector<char>& rigid = known_at(place).rigid;
   if (at_every_.empty()) at_every_ = rigid;
   for (std::size_t i = 0; i < at_every_.size(); ++i) at_every_[i] = at_every_[i] && i < rigid.size() && rigid[i];
 }
@@ -87,7 +80,7 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
   {
     go_to(place);
     if (equilibrium.history) throw Error("nothing drives a pair there, and sweeps of modes do not know such pairs");
-    const std::vector<char>& rigid = rigid_at(place);
+    const std::vector<char>& rigid = known_at(place).rigid;
     std::vector<char> common = basis_ ? basis_->closed : at_every_;
     if (common.size() != rigid.size())
       throw Error(format("the number of contact pairs changes from %zu to %zu", common.size(), rigid.size()));
@@ -121,13 +114,12 @@ void SweptModel::train_at(const SweptPlace& place, double tolerance)
 
 void SweptModel::forget(const SweptPlace& place)
 {
-  equilibria_.erase(place);
-  rigid_.erase(place);
+  known_.erase(place);
 }
 
 bool SweptModel::same_pairs_closed(const SweptPlace& a, const SweptPlace& b)
 {
-  return equilibrium_at(a).closed == equilibrium_at(b).closed && rigid_at(a) == rigid_at(b);
+  return equilibrium_at(a).closed == equilibrium_at(b).closed && known_at(a).rigid == known_at(b).rigid;
 }
 
 int SweptModel::changed_pairs(const SweptPlace& a, const SweptPlace& b)
@@ -168,7 +160,7 @@ std::optional<ContactChange> SweptModel::contact_change(const SweptPlace& from, 
   const Bracket ends{from.values[0], to.values[0], opens ? 1. : -1., opens ? -1. : 1.};
   const Bracket found = find_root(contact, ends, tolerance).bracket;
   for (const SweptPlace& place : visited)
-    if (place.values[0] != found.a && place.values[0] != found.b) equilibria_.erase(place);
+    if (place.values[0] != found.a && place.values[0] != found.b) forget(place);
   if (failed) return ContactChange{0, 0, failed};
   return ContactChange{found.a, found.b};
 }
@@ -184,7 +176,7 @@ ModeForms SweptModel::forms(const SweptPlace& from, const PointModes& first, con
   };
   const ExpandedModes before = expand(from, first), now = expand(to, second);
   const Structure& structure = model_->structure;
-  Owned<Mat> C = sliding_damping({structure, model_->interface, equilibria_.at(to)});
+  Owned<Mat> C = sliding_damping({structure, model_->interface, equilibrium_at(to)});
   if (structure.K_loss.get()) C = without_loss(C, structure);
   return forms_between(before, now, structure.M, C);
 }
@@ -197,7 +189,7 @@ Eigen::Index SweptModel::shapes() const
 MultiVector SweptModel::vectors(const PointModes& modes, Side side) const
 {
   const auto& [structure, interface] = *model_;
-  const ClosedContact contact = eliminate_closed_pairs(structure, interface, equilibria_.at(at_).closed);
+  const ClosedContact contact = eliminate_closed_pairs(structure, interface, known_.at(at_).equilibrium.closed);
   return expanded(*basis_, contact, modes.pairs, side);
 }
 

@@ -37,7 +37,7 @@ public:
   void prepare(const SweptPlace& place);
 
   /// What cannot be computed at a point, for whatever reason, is in the outcome.
-  const Equilibrium& equilibrium_at(const SweptPlace& place);
+  const Equilibrium& equilibrium_at(const SweptPlace& place) { return known_at(place).equilibrium; }
   PointModes modes_at(const SweptPlace& place, double tolerance);
 
   /// Makes the basis by a point, whose modes are then at hand when they are asked for next.
@@ -73,7 +73,13 @@ public:
 private:
   void go_to(const SweptPlace& place);
   BasisProblem basis_problem(const Equilibrium& equilibrium) const;
-  const std::vector<char>& rigid_at(const SweptPlace& place);
+  struct Known
+  {
+    Equilibrium equilibrium{};
+    std::vector<char> rigid{}; // closed pairs without a compliance
+  };
+
+  const Known& known_at(const SweptPlace& place);
 
   SweptProblem problem_;
   MPI_Comm comm_;
@@ -81,9 +87,8 @@ private:
   Equilibria searched_;
   std::optional<BrakeModel> model_{}; // at the point visited last
   SweptPlace at_{};
-  std::map<SweptPlace, Equilibrium> equilibria_{};
-  std::map<SweptPlace, std::vector<char>> rigid_{}; // closed pairs without a compliance
-  std::vector<char> at_every_{};                    // pairs closed and rigid at every point prepared
+  std::map<SweptPlace, Known> known_{};
+  std::vector<char> at_every_{}; // pairs closed and rigid at every point prepared
   std::optional<ModesBasis> basis_{};
   std::map<SweptPlace, PointModes> trained_{};
 };

@@ -106,6 +106,9 @@ struct Combinations
 /// The real parts of the sums of w_k Y'Q(lambda_k) Z y_k; of the left side those of w_k Z'Q(lambda_k)'Y y_k.
 MultiVector dynamic_forces(const SlidingBasis& basis, const LinearisedPoint& point, Side side, const Combinations& of);
 
+/// The columns of a sparse matrix.
+MultiVector dense_columns(Mat A);
+
 /// The degrees of freedom of x that are no pivots.
 MultiVector kept_rows(const MultiVector& x, const ClosedContact& contact);
 
