@@ -14,13 +14,20 @@ namespace
 
 using Two = double __attribute__((vector_size(16)));
 
-/// y += A x for the upper triangles of symmetric matrices. With two parts an Entry belongs to one matrix, and a row of
-/// x holds v and then u of all trajectories, each in so many Vectors. With one part and an Entry of two numbers a row
-/// of x is (v, u).
-template <std::size_t parts, class Entry, class Vector, std::size_t vectors>
+/// The columns that PairedRows hold: a rank's own from the diagonal on, for their mirror images as well, or others'.
+enum class ColumnsOf
+{
+  own,
+  others
+};
+
+/// y += A x. With two parts an Entry belongs to one matrix, and a row of x holds v and then u of all trajectories, each
+/// in so many Vectors. With one part and an Entry of two numbers a row of x is (v, u).
+template <ColumnsOf which, std::size_t parts, class Entry, class Vector, std::size_t vectors>
 SQUEAL_INLINE void add_product(const PairedRows& matrices, const double* x, double* y)
 {
   constexpr std::size_t width = sizeof(Vector) / sizeof(double), stride = parts * vectors * width;
+  constexpr bool mirrored = which == ColumnsOf::own;
   const PetscInt* const columns = matrices.columns.data();
   const std::array<double, 2>* const values = matrices.values.data();
   Entry entry;
@@ -29,86 +36,68 @@ SQUEAL_INLINE void add_product(const PairedRows& matrices, const double* x, doub
   {
     const auto first = static_cast<std::size_t>(matrices.starts[i]),
                end = static_cast<std::size_t>(matrices.starts[i + 1]);
+    if (first == end) continue;
     for (std::size_t n = 0; n < parts * vectors; ++n)
     {
-      std::memcpy(&own[n], x + i * stride + n * width, sizeof other);
       std::memcpy(&sums[n], y + i * stride + n * width, sizeof other);
-      std::memcpy(&entry, &values[first][n / vectors], sizeof entry); // on the diagonal
-      sums[n] += entry * own[n];
+      if constexpr (mirrored)
+      {
+        std::memcpy(&own[n], x + i * stride + n * width, sizeof other);
+        std::memcpy(&entry, &values[first][n / vectors], sizeof entry); // on the diagonal
+        sums[n] += entry * own[n];
+      }
     }
-    for (std::size_t k = first + 1; k < end; ++k)
+    for (std::size_t k = mirrored ? first + 1 : first; k < end; ++k)
       for (std::size_t n = 0; n < parts * vectors; ++n)
       {
         const std::size_t j = static_cast<std::size_t>(columns[k]) * stride + n * width;
         std::memcpy(&entry, &values[k][n / vectors], sizeof entry);
         std::memcpy(&other, x + j, sizeof other);
         sums[n] += entry * other;
-        std::memcpy(&other, y + j, sizeof other);
-        other += entry * own[n];
-        std::memcpy(y + j, &other, sizeof other);
+        if constexpr (mirrored)
+        {
+          std::memcpy(&other, y + j, sizeof other);
+          other += entry * own[n];
+          std::memcpy(y + j, &other, sizeof other);
+        }
       }
     for (std::size_t n = 0; n < parts * vectors; ++n) std::memcpy(y + i * stride + n * width, &sums[n], sizeof other);
   }
 }
 
-/// One trajectory. Without fused products K u of a body that moves without strain is zero to the last bit.
-void add_both(const PairedRows& matrices, const double* x, double* y)
+/// 4 or 8 trajectories of `parts` matrices.
+template <ColumnsOf which, std::size_t parts>
+SQUEAL_INLINE void add_lanes(const PairedRows& matrices, std::size_t lanes, const double* x, double* y)
 {
-  add_product<1, Two, Two, 1>(matrices, x, y);
+  if (lanes == 4)
+    add_product<which, parts, double, Four, 1>(matrices, x, y);
+  else if (SQUEAL_HAS_AVX512)
+    add_product<which, parts, double, Eight, 1>(matrices, x, y);
+  else
+    add_product<which, parts, double, Four, 2>(matrices, x, y);
 }
 
 /// 4 or 8 trajectories of both matrices, or of M alone.
-SQUEAL_SIMD void add_products(const PairedRows& matrices, std::size_t parts, std::size_t count, const double* x,
-                              double* y)
+SQUEAL_SIMD void add_products(ColumnsOf which, const PairedRows& matrices, std::size_t parts, std::size_t lanes,
+                              const double* x, double* y)
 {
-  if (parts == 2)
-    count == 4          ? add_product<2, double, Four, 1>(matrices, x, y)
-    : SQUEAL_HAS_AVX512 ? add_product<2, double, Eight, 1>(matrices, x, y)
-                        : add_product<2, double, Four, 2>(matrices, x, y);
+  if (which == ColumnsOf::own)
+    parts == 2 ? add_lanes<ColumnsOf::own, 2>(matrices, lanes, x, y)
+               : add_lanes<ColumnsOf::own, 1>(matrices, lanes, x, y);
   else
-    count == 4          ? add_product<1, double, Four, 1>(matrices, x, y)
-    : SQUEAL_HAS_AVX512 ? add_product<1, double, Eight, 1>(matrices, x, y)
-                        : add_product<1, double, Four, 2>(matrices, x, y);
+    parts == 2 ? add_lanes<ColumnsOf::others, 2>(matrices, lanes, x, y)
+               : add_lanes<ColumnsOf::others, 1>(matrices, lanes, x, y);
 }
 
-/// y += A x for columns of other ranks; Entry, Vector and the rows of x as above.
-template <std::size_t parts, class Entry, class Vector, std::size_t vectors>
-SQUEAL_INLINE void add_foreign(const PairedRows& matrices, const double* x, double* y)
+/// The same, or one trajectory of both: without fused products K u of a body that moves without strain is then zero to
+/// the last bit.
+template <ColumnsOf which>
+void add(const PairedRows& matrices, std::size_t parts, std::size_t lanes, const double* x, double* y)
 {
-  constexpr std::size_t width = sizeof(Vector) / sizeof(double), stride = parts * vectors * width;
-  Entry entry;
-  Vector sum, other;
-  for (std::size_t i = 0; i + 1 < matrices.starts.size(); ++i)
-    for (std::size_t n = 0; n < parts * vectors && matrices.starts[i] < matrices.starts[i + 1]; ++n)
-    {
-      std::memcpy(&sum, y + i * stride + n * width, sizeof sum);
-      for (auto k = static_cast<std::size_t>(matrices.starts[i]); k < static_cast<std::size_t>(matrices.starts[i + 1]);
-           ++k)
-      {
-        std::memcpy(&entry, &matrices.values[k][n / vectors], sizeof entry);
-        std::memcpy(&other, x + static_cast<std::size_t>(matrices.columns[k]) * stride + n * width, sizeof other);
-        sum += entry * other;
-      }
-      std::memcpy(y + i * stride + n * width, &sum, sizeof sum);
-    }
-}
-
-void add_foreign_both(const PairedRows& matrices, const double* x, double* y)
-{
-  add_foreign<1, Two, Two, 1>(matrices, x, y);
-}
-
-SQUEAL_SIMD void add_foreign_products(const PairedRows& matrices, std::size_t parts, std::size_t count, const double* x,
-                                      double* y)
-{
-  if (parts == 2)
-    count == 4          ? add_foreign<2, double, Four, 1>(matrices, x, y)
-    : SQUEAL_HAS_AVX512 ? add_foreign<2, double, Eight, 1>(matrices, x, y)
-                        : add_foreign<2, double, Four, 2>(matrices, x, y);
+  if (lanes == 1)
+    add_product<which, 1, Two, Two, 1>(matrices, x, y);
   else
-    count == 4          ? add_foreign<1, double, Four, 1>(matrices, x, y)
-    : SQUEAL_HAS_AVX512 ? add_foreign<1, double, Eight, 1>(matrices, x, y)
-                        : add_foreign<1, double, Four, 2>(matrices, x, y);
+    add_products(which, matrices, parts, lanes, x, y);
 }
 
 /// Columns of other ranks in this rank's rows, ascending.
@@ -228,14 +217,12 @@ void multiply(const PairedMatrices& matrices, std::size_t lanes, std::span<const
     for (std::size_t i = 0; i < rows; ++i)
       for (std::size_t k = 0; k < parts * count; ++k) x[i * stride + k / count * lanes + k % count] = read[k][i];
     y.assign(x.size(), 0.);
-    lanes == 1 ? add_both(matrices.own, x.data(), y.data())
-               : add_products(matrices.own, parts, lanes, x.data(), y.data());
+    add<ColumnsOf::own>(matrices.own, parts, lanes, x.data(), y.data());
     if (ranks_of(matrices.comm) > 1)
     {
       check(PetscSFBcastBegin(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
       check(PetscSFBcastEnd(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
-      lanes == 1 ? add_foreign_both(matrices.foreign, z.data(), y.data())
-                 : add_foreign_products(matrices.foreign, parts, lanes, z.data(), y.data());
+      add<ColumnsOf::others>(matrices.foreign, parts, lanes, z.data(), y.data());
     }
     for (std::size_t i = 0; i < rows; ++i)
       for (std::size_t k = 0; k < parts * count; ++k) written[k][i] = y[i * stride + k / count * lanes + k % count];
