@@ -135,10 +135,9 @@ void use_mumps(ST transformation)
   check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
 }
 
-ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options,
-                              const EliminationOrder* order)
+ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options)
 {
-  return {K, M, 0, std::make_unique<PencilFactor>(K, M, symmetry, options, order)};
+  return {K, M, 0, std::make_unique<PencilFactor>(K, M, symmetry, options)};
 }
 
 void move_to(ShiftInvert& pencil, double shift)

@@ -23,8 +23,7 @@ struct RealCount
   PencilOptions options{};
   std::vector<double> all{};     // eigenvalues omega^2 of a small problem
   std::map<double, int> below{}; // the counts so far
-  EliminationOrder order{};      // of a large problem, from the first count on
-  ShiftInvert pencil{};          // the same
+  ShiftInvert pencil{};          // of a large problem, from the first count on
 };
 
 /// A count for K x = omega^2 M x. Borrows M and K.
@@ -32,9 +31,6 @@ RealCount make_real_count(Mat M, Mat K, const ModesOptions& options);
 
 /// The number of eigenvalues below omega [rad/s].
 int count_below(RealCount& count, double omega);
-
-/// Of K, found once.
-const EliminationOrder& order_of(RealCount& count);
 
 /// Gives back the memory of the factor. A further count makes it again.
 void free_factor(RealCount& count);
