@@ -138,7 +138,7 @@ struct FactorForecast
   double operations = 0;                   // to make a Factor, on the rank that has most to do
 };
 
-/// Forecasts a Factor of A and B, and MUMPS's factors of A in the same order. B may be null. Collective.
+/// Forecasts a Factor of A and B, and MUMPS's factors of A as if in the same order. B may be null. Collective.
 FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options);
 
 /// x = A^-1 b. The factor has no border. Collective.
