@@ -256,7 +256,7 @@ std::set<Effect> NearbyModels::changes(const Known& known, const Values& values)
   {
     for (const auto& [key, value] : these)
       if (const auto other = others.find(key); other == others.end() || other->second != value)
-        changed.insert(effect_of_number(scene_, key));
+        changed.insert(description_of(scene_, key).effect);
   };
   compare(values, *known.values);
   compare(*known.values, values);

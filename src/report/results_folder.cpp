@@ -111,9 +111,10 @@ void ResultsFolder::make()
   run_ = new_identity();
   const fs::path partial = place_ / partial_folder, finished = place_ / finished_folder;
   made_ = fs::create_directories(place_);
-  for (const fs::path& folder : {partial, finished})
-    if (fs::exists(folder) && !fs::exists(place_ / lock_file))
-      refuse_folder(folder, "runs work in a folder of this name, and no run has made this one");
+  const bool is_of_a_run = fs::exists(place_ / lock_file) || fs::exists(place_ / word(ResultFile::options));
+  for (const char* folder : {partial_folder, finished_folder, word(ResultFile::reduced), word(ResultFile::checkpoints)})
+    if (fs::exists(place_ / folder) && !is_of_a_run)
+      refuse_folder(place_ / folder, "runs write into a folder of this name, and no run has made this one");
   const std::string holder = lock();
   if (!holder.empty())
     throw Error("another run writes into " + place_.string() + " (" + holder +
@@ -134,8 +135,9 @@ void ResultsFolder::undo()
 {
   std::error_code ignored;
   if (!partial_.empty()) fs::remove_all(partial_, ignored);
-  if (!partial_.empty()) fs::remove(place_ / lock_file, ignored);
-  if (made_) fs::remove(place_, ignored); // unless checkpoints are in it
+  const bool is_mark = fs::exists(checkpoints(), ignored) && !fs::exists(place_ / word(ResultFile::options), ignored);
+  if (!partial_.empty() && !is_mark) fs::remove(place_ / lock_file, ignored); // else it says that a run made them
+  if (made_) fs::remove(place_, ignored);                                     // unless something is in it
 }
 
 std::string ResultsFolder::keep_finished()
@@ -237,33 +239,26 @@ std::vector<fs::path> inputs_of(const Scene& scene)
 
 void check_outputs(const Scene& scene, const std::vector<fs::path>& inputs, const fs::path& place)
 {
-  std::vector<fs::path> results;
-  for (const char* name : words_of<ResultFile>)
-    if (results.push_back(place / name); results.back().has_extension() && is_folder(results.back()))
-      throw Error("the output " + results.back().string() +
-                  " is a folder, which the result would replace: name another folder with --output DIR");
-  for (const ResultFile folder : {ResultFile::reduced, ResultFile::checkpoints})
-    if (is_folder(place / word(folder)) && !is_file(place / word(ResultFile::options)))
-      throw Error("the output " + place.string() + " holds a folder '" + word(folder) +
-                  "' that no run has made: name another folder with --output DIR");
-  const auto refuse_on = [](const fs::path& output, const std::vector<fs::path>& others, const std::string& remedy)
+  const std::string elsewhere = "name another folder with --output DIR";
+  std::vector<fs::path> taken = inputs;
+  const auto take = [&](const fs::path& output, const std::string& remedy)
   {
-    for (const fs::path& other : others)
+    for (const fs::path& other : taken)
       if (is_same_file(output, other))
-        throw Error("the output " + output.string() + " would fall on " + other.string() + ": " + remedy);
+        throw Error("the output " + output.string() + " would fall on " + other.string() + ", an input or another " +
+                    "output: " + remedy);
+    taken.push_back(output);
   };
-  for (const fs::path& result : results)
-    refuse_on(result, inputs, "the run reads that file; name another folder with --output DIR");
+  for (const char* name : words_of<ResultFile>)
+  {
+    const fs::path result = place / name;
+    if (result.has_extension() && is_folder(result))
+      throw Error("the output " + result.string() + " is a folder, which the result would replace: " + elsewhere);
+    take(result, elsewhere);
+  }
   for (const auto& [key, file] : {std::pair("[transient] save_state", scene.transient.save_state),
                                   std::pair("[cycle] save_state", scene.cycle.save_state)})
-  {
-    if (file.empty()) continue;
-    refuse_on(file, inputs, std::string("the run reads that file; give ") + key + " another name");
-    refuse_on(file, results, std::string("a result has that name; give ") + key + " another one");
-  }
-  const fs::path &one = scene.transient.save_state, &other = scene.cycle.save_state;
-  if (!one.empty() && !other.empty())
-    refuse_on(one, {other}, "[transient] save_state and [cycle] save_state must be two files");
+    if (!file.empty()) take(file, std::string("give ") + key + " another name");
 }
 
 } // namespace squeal

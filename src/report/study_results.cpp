@@ -177,7 +177,7 @@ void add_key(Entry out, const char* meaning, const std::string& key)
 {
   out.show("key", "text", meaning, key);
   out.show("name", "text", "a name for the place in the key; empty where the key says it",
-           out.is_example() ? "" : name_of_number(out.scene(), key));
+           out.is_example() ? "" : description_of(out.scene(), key).name);
 }
 
 void add_response(Entry out, const Report& report)

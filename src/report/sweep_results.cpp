@@ -209,8 +209,9 @@ void add_sweep(Entry out, const Report& report)
   std::vector<std::string> names, units;
   for (const std::string& key : settings.key)
   {
-    names.push_back(name_of_number(out.scene(), key));
-    units.push_back(unit_of_number(out.scene(), key));
+    const NumberDescription number = description_of(out.scene(), key);
+    names.push_back(number.name);
+    units.push_back(number.unit);
   }
   const auto unstable = std::ranges::count_if(sweep.points, [](const SweepPoint& point) { return point.unstable > 0; });
   out.show("keys", "text", "numbers that are swept", settings.key);

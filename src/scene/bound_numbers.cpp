@@ -121,25 +121,14 @@ std::vector<EntryKey> entries_of(Scene& scene, const std::string& table)
   return entries;
 }
 
-std::string unit_of_number(const Scene& scene, const std::string& key)
+NumberDescription description_of(const Scene& scene, const std::string& key)
 {
   Scene copy = scene; // keys bind members that can be written
-  return find_value(copy, key).unit;
-}
-
-std::string name_of_number(const Scene& scene, const std::string& key)
-{
-  Scene copy = scene;
-  return find_value(copy, key).title;
-}
-
-Effect effect_of_number(const Scene& scene, const std::string& key)
-{
-  Scene copy = scene;
-  const Effect effect = find_value(copy, key).effect;
+  const FoundValue found = find_value(copy, key);
   const bool spins = key.starts_with("part.") &&
                      std::ranges::any_of(scene.parts, [](const Part& part) { return part.rotation.has_value(); });
-  return effect == Effect::mass && spins ? Effect::stiffness_and_mass : effect;
+  const bool stiffens = found.effect == Effect::mass && spins;
+  return {found.unit, found.title, stiffens ? Effect::stiffness_and_mass : found.effect};
 }
 
 Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers)

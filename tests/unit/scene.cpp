@@ -410,7 +410,7 @@ TEST_CASE("a number is set through its member as a file would set it, and its ke
 
   scene.parts.emplace_back().name = "disc";
   scene.parts[0].material.orthotropy.emplace();
-  const auto effect = [&](const char* key) { return effect_of_number(scene, key); };
+  const auto effect = [&](const char* key) { return description_of(scene, key).effect; };
   CHECK(effect("cycle.theta") == Effect::nothing);
   CHECK(effect("force.0.vector.2") == Effect::load);
   CHECK(effect("friction.coefficient") == Effect::friction);

@@ -43,7 +43,8 @@ class ResultsFolder
 {
 public:
   /// Makes and locks the folder; what a run that was killed left there is moved if it is whole, else removed.
-  /// Collective. Error: the folder cannot be written, or another run is at work in it.
+  /// Collective. Error: the folder cannot be written, another run is at work in it, or it holds a folder of a result's
+  /// name that no run has made.
   ResultsFolder(const std::filesystem::path& place, MPI_Comm comm);
 
   /// Without publish, leaves everything as it was before, but for checkpoints and what keep_finished keeps.
@@ -85,8 +86,8 @@ std::vector<std::filesystem::path> inputs_of(const Scene& scene);
 /// Whether two names are of one file, which may not exist yet.
 bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b);
 
-/// Error: an output of the scene, or a result in this place, would fall on what the run reads, or on a folder that no
-/// run has made.
+/// Error: an output of the scene, or a result in this place, would fall on what the run reads, on another output or on
+/// a folder.
 void check_outputs(const Scene& scene, const std::vector<std::filesystem::path>& inputs,
                    const std::filesystem::path& place);
 

@@ -34,9 +34,6 @@ enum class Effect
   mesh,               // all: nodes, their numbering, the pairs
 };
 
-/// What a change of a scene's number changes, by its key: density changes the stiffness of a part that spins as well.
-Effect effect_of_number(const Scene& scene, const std::string& key);
-
 /// Returns the scene with other values of numbers that it has. Throws Error if that is no scene.
 Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers);
 
@@ -57,12 +54,15 @@ std::vector<std::string> contact_names(const Scene& scene);
 /// frequency of its equivalent in time, on which modes do not depend.
 std::vector<SceneNumber> from_zero(const Scene& scene, const SceneNumber& number);
 
-/// The unit of a number of a scene, "-" where it has none.
-std::string unit_of_number(const Scene& scene, const std::string& key);
+/// A number as the table of keys describes it.
+struct NumberDescription
+{
+  std::string unit; // "-" where it has none
+  std::string name; // of what the key calls by its place alone, "part.0.young": of that part, or "pad on disc"
+  Effect effect{};  // of a change: density changes the stiffness of a part that spins as well
+};
 
-/// What a number's key calls by its place alone, "part.0.young" or "contact.1.gap": the name of that part, or
-/// "pad on disc". Empty where the key says it itself.
-std::string name_of_number(const Scene& scene, const std::string& key);
+NumberDescription description_of(const Scene& scene, const std::string& key);
 
 /// The numbers with respect to which eigenvalues are derived, with the scene's values. They are those that it names,
 /// else friction and what is not zero of parts, points, bodies, springs, damping and rates of rotation.
