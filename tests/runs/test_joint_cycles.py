@@ -161,7 +161,7 @@ def test_a_node_that_slips_both_ways_forgets_its_offset(scene, converged, ranks)
 def test_a_bracket_walks_until_its_spring_holds_it(scene, converged):
     cycle = converged(scene(SLIDING), ranks=1).report["cycle"]
     assert cycle["period"] == pytest.approx(5.963757, rel=1e-5)
-    assert cycle["mean_fluctuating_energy"] == pytest.approx(0.5562, rel=1e-3)
+    assert cycle["mean_fluctuating_energy"] == pytest.approx(0.5562, rel=2e-3)
     assert cycle["joints"]["slipping"] >= 2
     assert sum(cycle["joints"]["work"]) == pytest.approx(-0.0567, rel=0.05)
 
