@@ -155,7 +155,7 @@ JointUse JointUseMeter::result() const
 
 void OwnRest::follow(const SlidingEquilibrium& path, const FactorOptions& factor, const JointMotion& motion)
 {
-  constexpr double near = 1e-3; // of the swing
+  constexpr double near = 1e-4; // of the swing
   double moved = offsets_.empty() ? HUGE_VAL : 0;
   for (std::size_t i = 0; i < offsets_.size(); ++i)
     if (is_undriven(path.interface, PairRows<std::size_t>(path.interface.directions).pair_of(i)))

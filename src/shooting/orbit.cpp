@@ -1,5 +1,6 @@
 #include "squeal/shooting/orbit.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace squeal
@@ -61,9 +62,9 @@ bool collapsing(const OrbitProblem& problem, const Orbit& orbit)
 
 bool slips_one_way(const OrbitProblem& problem, const Orbit& orbit)
 {
-  constexpr double small = 1e-5;
-  const auto& [slip, swing, held] = orbit.offsets;
-  return slip > (problem.tolerance > 0 ? problem.tolerance : small) * swing;
+  constexpr double least = 1e-6, of_accuracy = 1e-5;
+  const double allowed = problem.tolerance > 0 ? std::max(problem.tolerance, least) : of_accuracy;
+  return orbit.offsets.slip > allowed * orbit.offsets.swing;
 }
 
 Owned<Vec> fluctuation_of(const OrbitProblem& problem, const Orbit& orbit)

@@ -64,7 +64,7 @@ private:
 class OwnRest
 {
 public:
-  /// Moves the rest to the offsets of a motion, once they have moved by more than a thousandth of its swing.
+  /// Moves the rest to the offsets of a motion, once they have moved by more than a part 1e-4 of its swing.
   void follow(const SlidingEquilibrium& path, const FactorOptions& factor, const JointMotion& motion);
 
   /// The rest, else the path's equilibrium.

@@ -114,8 +114,8 @@ bool admissible_period(const OrbitProblem& problem, double period);
 /// Whether the orbit is falling onto the equilibrium.
 bool collapsing(const OrbitProblem& problem, const Orbit& orbit);
 
-/// Whether an offset moves one way by more than the tolerance, or 1e-5 where there is none. A correction would end it
-/// where no motion does.
+/// Whether an offset moves one way in a period by more than the tolerance, and 1e-6, of the swing; without a tolerance
+/// by more than 1e-5. A correction would end it where no motion does.
 bool slips_one_way(const OrbitProblem& problem, const Orbit& orbit);
 
 /// x - rest
