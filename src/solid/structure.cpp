@@ -1,6 +1,6 @@
 /// M, C, K and the load on the free degrees of freedom: sums of T_e' A_e T_e over contributions, u_e = T_e q.
 ///
-/// A contribution is that of an element, or lumped: the mass of a point or rigid body, a spring, a superelement. A rank
+/// A contribution is that of an element, or lumped: a mass, spring, connector, beam or superelement. A rank
 /// has all elements that share a degree of freedom with it, so that it counts the entries of its own rows exactly.
 /// Contributions to rows of other ranks are sent at the end of the assembly. All three matrices receive every
 /// contribution, zeros included, which gives them one pattern.

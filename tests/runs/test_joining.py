@@ -107,7 +107,7 @@ def test_bolts_are_tightened_in_the_order_of_the_steps(write, converged):
 def test_no_load_factor_unloads_a_bolt(write, converged):
     more = FORCE.format(on="head", value=1000) + "\n[transient]\nsteps = 200\nstep_size = 1e-7\nstart = 'equilibrium'\n"
     report = converged(write(JOINT + more + "load_factor = [[0, 1], [1e-6, 0]]\n"), ranks=1).report
-    assert report["transient"]["outcome"] == "converged"
+    assert report["transient"]["outcome"] == "completed" and report["transient"]["energy_defect_max"] < 1e-9
     assert report["equilibrium"]["bolts"][0]["tension"] == pytest.approx(20200, rel=1e-9)
 
 
