@@ -1,8 +1,11 @@
 #include "squeal/model.hpp"
 
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/equilibrium/tighten.hpp"
+#include "squeal/load_steps.hpp"
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/ties.hpp"
 #include "squeal/solid/matrix_rows.hpp"
@@ -105,32 +108,6 @@ void check_circulatory_part(const Scene& scene, const Model& model)
                 "pairs and load: take B, gap, drive and F out, or bring friction in by pairs");
 }
 
-/// The load at the end of a step of a scene, given as the scene that has it.
-using LoadOf = std::function<Owned<Vec>(const Scene& scene, const LoadStep& step)>;
-
-/// The steps to `load`, at which the last one ends.
-std::vector<PathStep> path_to(Vec load, const Scene& scene, const LoadOf& load_of)
-{
-  std::vector<PathStep> path;
-  for (const LoadStep& step : scene.steps)
-  {
-    Scene loaded = scene;
-    for (std::size_t i = 0; i < loaded.forces.size(); ++i)
-      loaded.forces[i].vector = step.load * (step.forces.empty() ? 1 : step.forces[i]) * loaded.forces[i].vector;
-    for (std::size_t i = 0; i < loaded.pressures.size(); ++i)
-      loaded.pressures[i].value *= step.load * (step.pressures.empty() ? 1 : step.pressures[i]);
-    const bool is_last = &step == &scene.steps.back();
-    path.push_back({step.name, is_last ? shared(load) : load_of(loaded, step), step.friction});
-  }
-  return path;
-}
-
-LoadOf load_of_mesh(const MeshPiece& piece, MPI_Comm comm)
-{
-  return [&piece, comm](const Scene& loaded, const LoadStep&)
-  { return assemble_load(piece.mesh, loaded, piece.dofs, comm); };
-}
-
 Model model_of_matrices(const Scene& scene, MPI_Comm comm)
 {
   Model model;
@@ -162,14 +139,6 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
   return model;
 }
 
-/// A path that shares its loads with this one.
-std::vector<PathStep> sharing(const std::vector<PathStep>& path)
-{
-  std::vector<PathStep> result;
-  for (const PathStep& step : path) result.push_back({step.name, shared(step.load.get()), step.driven_friction});
-  return result;
-}
-
 /// Structure and contact that share all matrices with these.
 BrakeModel sharing(const Structure& own, const Interface& contact)
 {
@@ -181,8 +150,7 @@ BrakeModel sharing(const Structure& own, const Interface& contact)
        {&Structure::M, &Structure::C, &Structure::K, &Structure::G, &Structure::H, &Structure::K_loss})
     structure.*matrix = shared((own.*matrix).get());
   structure.loss_omega = own.loss_omega;
-  structure.load = shared(own.load.get());
-  structure.path = sharing(own.path);
+  share_loads(own, structure);
   structure.elements = own.elements;
   structure.names = own.names;
   return result;
@@ -243,8 +211,9 @@ Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
   ContactPairs contact;
   MeshPiece piece = numbered(scene, std::move(mesh), contact, comm);
   model.structure = assemble(piece, scene, comm);
-  model.structure.path = path_to(model.structure.load, scene, load_of_mesh(piece, comm));
+  model.structure.path = path_of_mesh(model.structure, scene, piece, comm);
   model.interface = make_interface(contact.pairs, scene, piece.dofs, comm);
+  tighten(model.structure, model.interface);
   model.coverage = contact.coverage;
   model.probes = probe_rows(scene.probes, piece.mesh, piece.dofs, comm);
   take_mesh(model, std::move(piece), comm);
@@ -254,9 +223,7 @@ Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
 /// The mesh with points and reference points where the scene has them.
 Mesh with_points(Mesh mesh, const Scene& scene)
 {
-  for (const Point& point : scene.points) mesh.nodes[static_cast<std::size_t>(mesh.points.at(point.name))] = point.at;
-  for (const RigidBody& body : scene.rigid_bodies)
-    mesh.nodes[static_cast<std::size_t>(mesh.points.at(body.name))] = body.at;
+  place_points(scene, mesh);
   return mesh;
 }
 
@@ -327,13 +294,14 @@ BrakeModel NearbyModels::made_of_mesh(const Scene& scene, const std::set<Effect>
     if (serves(from_own, effects)) return &own_.model;
     return serves(from_last, effects) ? &last_.model : nullptr;
   };
-  const BrakeModel *const
-      mass_of = at_hand({Effect::mesh, Effect::stiffness_and_mass, Effect::mass}),
-      *const stiffness_of = at_hand({Effect::mesh, Effect::stiffness_and_mass}),
-      *const loss_of = at_hand({Effect::mesh, Effect::stiffness_and_mass, Effect::damping}),
-      *const damping_of = at_hand({Effect::mesh, Effect::stiffness_and_mass, Effect::mass, Effect::damping}),
-      *const load_of = at_hand({Effect::mesh, Effect::load}), *const rows_of = at_hand({Effect::mesh, Effect::drive}),
-      *const contact_of = at_hand({Effect::mesh, Effect::drive, Effect::gap});
+  const BrakeModel *const mass_of = at_hand({Effect::mesh, Effect::stiffness_and_mass, Effect::mass}),
+                          *const stiffness_of = at_hand({Effect::mesh, Effect::stiffness_and_mass}),
+                          *const loss_of = at_hand({Effect::mesh, Effect::stiffness_and_mass, Effect::damping}),
+                          *const damping_of =
+                              at_hand({Effect::mesh, Effect::stiffness_and_mass, Effect::mass, Effect::damping}),
+                          *const load_of = has_preload(scene) ? nullptr : at_hand({Effect::mesh, Effect::load}),
+                          *const rows_of = at_hand({Effect::mesh, Effect::drive}),
+                          *const contact_of = at_hand({Effect::mesh, Effect::drive, Effect::gap});
   BrakeModel next;
   if (damping_of)
     next = sharing(damping_of->structure, {});
@@ -351,14 +319,12 @@ BrakeModel NearbyModels::made_of_mesh(const Scene& scene, const std::set<Effect>
   if (stiffness_of) structure.G = shared(stiffness_of->structure.G.get());
   if (loss_of) structure.K_loss = shared(loss_of->structure.K_loss.get());
   if (load_of)
-  {
-    structure.load = shared(load_of->structure.load.get());
-    structure.path = sharing(load_of->structure.path);
-  }
+    share_loads(load_of->structure, structure);
   else
   {
     structure.load = assemble_load(piece(scene).mesh, scene, piece(scene).dofs, comm_);
-    structure.path = path_to(structure.load, scene, load_of_mesh(piece(scene), comm_));
+    assemble_preload(structure, piece(scene), scene, comm_);
+    structure.path = path_of_mesh(structure, scene, piece(scene), comm_);
     ++made_.load;
   }
   if (contact_of)
@@ -391,6 +357,7 @@ BrakeModel NearbyModels::at(std::span<const SceneNumber> numbers)
   Interface& interface = last_.model.interface;
   interface.friction = friction_of_pairs(scene, interface.geometry);
   check_interface(interface, "contact", comm_);
+  tighten(last_.model.structure, interface);
   last_.values = std::move(values);
   return sharing(last_.model.structure, interface);
 }
@@ -428,6 +395,20 @@ ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm)
   check(MatNorm(model.structure.M, NORM_1, &mass));
   if (mass > 0) summary.rounding_hz = 1e-6 * std::sqrt(stiffness / mass) / two_pi;
   return summary;
+}
+
+void add_shifts(const Scene& scene, const Model& model, std::vector<double>& values, MPI_Comm comm)
+{
+  const auto add_all = [&]
+  {
+    if (model.dofs.shift.empty()) return;
+    const std::vector<int> nodes = probed_nodes(scene.probes, model.mesh);
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      for (std::size_t c = 0; c < 3; ++c)
+        values[i] += scene.probes[i].direction[c] * model.dofs.shift_of(6 * PetscInt{nodes[i]} + static_cast<int>(c));
+  };
+  on_rank_zero(comm, add_all);
+  broadcast(values, comm);
 }
 
 std::vector<double> probe_values(Mat probes, Vec u)

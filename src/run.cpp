@@ -161,6 +161,9 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   {
     report.contacts = contact_resultants(model.interface, point.equilibrium.reactions, scene.contacts);
     report.equilibrium_probes = probe_values(model.probes, point.equilibrium.u);
+    add_shifts(scene, model, report.equilibrium_probes, comm);
+    for (const TightBolt& bolt : model.structure.bolts)
+      report.bolts.push_back({bolt.name, tension_of(bolt, point.equilibrium.u), bolt.shortening});
   }
   save();
   report.point = with_small_motions(std::move(report.point), scene, options, runner);

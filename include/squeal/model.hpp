@@ -67,6 +67,9 @@ private:
 /// What the model is, as far as it is known before anything is solved; warnings and length on rank 0. Collective.
 ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm);
 
+/// Adds to what probes read of an equilibrium by how much supports move their nodes [m]. Collective.
+void add_shifts(const Scene& scene, const Model& model, std::vector<double>& values, MPI_Comm comm);
+
 /// What the probes read of a displacement [m], whole on every rank. Collective.
 std::vector<double> probe_values(Mat probes, Vec u);
 

@@ -1,5 +1,6 @@
 #include "squeal/contact/interface.hpp"
 
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/solid/binary.hpp"
 #include "squeal/solid/sparse_rows.hpp"
@@ -110,6 +111,36 @@ void check_interface(const Interface& interface, const std::string& source, MPI_
   agree(comm, problem);
 }
 
+namespace
+{
+
+/// Adds to the gaps what supports move the pairs' nodes by. Collective; rank 0 knows it. Throws Error where they move
+/// an undriven pair along its surfaces, which is a slip on the way that no step states.
+void add_shifts(Interface& interface, const Scene& scene, const DofMap& dofs, MPI_Comm comm)
+{
+  const auto add_all = [&]
+  {
+    for (std::size_t i = 0; i < interface.geometry.size() && !dofs.shift.empty(); ++i)
+    {
+      const ContactPair& pair = interface.geometry[i];
+      Vec3 moved{};
+      for (const auto& [node, weight] : pair.nodes)
+        for (int c = 0; c < 3; ++c)
+          moved[static_cast<std::size_t>(c)] += weight * dofs.shift_of(6 * PetscInt{node} + c);
+      interface.gap[i] += dot(pair.normal, moved);
+      const Contact& contact = scene.contacts[static_cast<std::size_t>(pair.contact)];
+      if (is_undriven(contact) && norm(tangential(moved, pair.normal)) > 0)
+        throw Error("contact of '" + contact.rotor + "' and '" + contact.stator +
+                    "': a support moves its nodes along the surface: let it move a body that springs or elements "
+                    "join to them");
+    }
+  };
+  on_rank_zero(comm, add_all);
+  broadcast(interface.gap, comm);
+}
+
+} // namespace
+
 Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& scene, const DofMap& dofs, MPI_Comm comm)
 {
   Interface interface;
@@ -143,6 +174,7 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
       for (const auto& [node, weight] : pair.nodes) add_displacement(dofs, node, weight * axis, rows.back());
     }
   }
+  add_shifts(interface, scene, dofs, comm);
   interface.B = matrix_of_rows(scattered_rows(std::move(rows), interface.pairs, comm), dofs.last - dofs.first, comm);
   check_interface(interface, "contact", comm);
   return interface;

@@ -7,9 +7,12 @@
 #include "dual_rows.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/packed.hpp"
+#include "squeal/mesh/frames.hpp"
+#include "squeal/mesh/row_motions.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace squeal
 {
@@ -27,19 +30,30 @@ std::string name_of(const Contact& contact)
   return "contact of '" + contact.rotor + "' and '" + contact.stator + "': ";
 }
 
-/// Which translations of a node supports or rigid bodies hold or tie to others.
-using HeldMotions = std::map<int, std::array<bool, 3>>;
+/// Directions in which supports or rigid bodies hold a node or tie it to others, each square to those before it.
+using HeldMotions = std::map<int, std::vector<Vec3>>;
+
+void hold(std::vector<Vec3>& held, Vec3 direction)
+{
+  for (const Vec3& other : held) direction = direction - dot(direction, other) * other;
+  if (const double rest = norm(direction); rest > 1e-6) held.push_back((1 / rest) * direction);
+}
 
 HeldMotions held_motions(const Mesh& mesh, const Scene& scene)
 {
   HeldMotions held;
   for (const Support& support : scene.supports)
     for (const int node : named_nodes(mesh, support.on, "support"))
-      for (std::size_t c = 0; c < 3; ++c)
-        if (support.fixed[c]) held[node][c] = true;
+    {
+      const Eigen::Matrix3d axes = axes_at(support.frame, mesh.nodes[node], "support on " + support.on);
+      for (int c = 0; c < 3; ++c)
+        if (support.fixed[static_cast<std::size_t>(c)]) hold(held[node], {axes(0, c), axes(1, c), axes(2, c)});
+    }
   for (const RigidBody& body : scene.rigid_bodies)
     for (const std::string& surface : body.surfaces)
-      for (const int node : named_nodes(mesh, surface, "rigid body " + body.name)) held[node] = {true, true, true};
+      for (const int node : named_nodes(mesh, surface, "rigid body " + body.name))
+        for (std::size_t c = 0; c < 3; ++c)
+          if (body.motions[c]) hold(held[node], {c == 0 ? 1. : 0., c == 1 ? 1. : 0., c == 2 ? 1. : 0.});
   return held;
 }
 
@@ -127,8 +141,7 @@ bool is_held(const HeldMotions& held, int node, const Vec3& normal)
   const auto motions = held.find(node);
   if (motions == held.end()) return false;
   double share = 0;
-  for (std::size_t k = 0; k < 3; ++k)
-    if (motions->second[k]) share += normal[k] * normal[k];
+  for (const Vec3& direction : motions->second) share += dot(direction, normal) * dot(direction, normal);
   return share > most;
 }
 
@@ -243,6 +256,23 @@ void add_surface_pairs(const Mesh& mesh, const Scene& scene, int index, ContactP
   std::move(pairs.begin(), pairs.end(), std::back_inserter(result.pairs));
 }
 
+/// Adds the gaps of a contact's file to its pairs. Throws Error for a slave node that has none there.
+void add_given_gaps(const Mesh& mesh, const Contact& contact, std::span<ContactPair> pairs)
+{
+  if (contact.gap_file.empty()) return;
+  const std::vector<PlacedGap> gaps = read_gaps(contact.gap_file);
+  const double near = 1e-6 * diagonal_of(mesh.nodes);
+  for (ContactPair& pair : pairs)
+  {
+    const Vec3& at = mesh.nodes[static_cast<std::size_t>(pair.node)];
+    const auto found = std::ranges::find_if(gaps, [&](const PlacedGap& gap) { return norm(gap.at - at) <= near; });
+    if (found == gaps.end())
+      throw Error(name_of(contact) + contact.gap_file.string() + " has no line for " + node_text(pair.node, at) +
+                  " of the slave side");
+    pair.gap += found->gap;
+  }
+}
+
 } // namespace
 
 ContactPairs make_pairs(const Mesh& mesh, const Scene& scene)
@@ -251,19 +281,22 @@ ContactPairs make_pairs(const Mesh& mesh, const Scene& scene)
   for (std::size_t i = 0; i < scene.contacts.size(); ++i)
   {
     const Contact& contact = scene.contacts[i];
+    const std::size_t first = result.pairs.size();
     const auto rotor = mesh.points.find(contact.rotor), stator = mesh.points.find(contact.stator);
     if ((rotor == mesh.points.end()) != (stator == mesh.points.end()))
       throw Error(name_of(contact) + "one is a point and the other is not; name two points or two surfaces");
     if (rotor == mesh.points.end())
-    {
       add_surface_pairs(mesh, scene, static_cast<int>(i), result);
-      continue;
+    else if (!contact.normal)
+      throw Error(name_of(contact) + "two points need a normal");
+    else
+    {
+      const int a = rotor->second, b = stator->second;
+      result.coverage.emplace_back();
+      const Vec3 normal = (1 / norm(*contact.normal)) * *contact.normal;
+      result.pairs.push_back({a, b, b, mesh.nodes[a], normal, 0, static_cast<int>(i), 0, {{b, 1}, {a, -1}}, 1});
     }
-    if (!contact.normal) throw Error(name_of(contact) + "two points need a normal");
-    const int a = rotor->second, b = stator->second;
-    result.coverage.emplace_back();
-    const Vec3 normal = (1 / norm(*contact.normal)) * *contact.normal;
-    result.pairs.push_back({a, b, b, mesh.nodes[a], normal, 0, static_cast<int>(i), 0, {{b, 1}, {a, -1}}, 1});
+    add_given_gaps(mesh, contact, std::span(result.pairs).subspan(first));
   }
   return result;
 }

@@ -97,6 +97,27 @@ std::map<long, int> joined_nodes(const Mesh& mesh, const Superelement& superelem
   return joined;
 }
 
+/// Adds the nodes of the scene's beams between their ends. Throws Error for ends at one place.
+void add_beams(const Scene& scene, Mesh& mesh)
+{
+  for (const Beam& beam : scene.beams)
+  {
+    const std::string user = "beam " + beam.name;
+    std::vector<int> nodes{point_node(mesh, beam.from, user)};
+    const int end = point_node(mesh, beam.to, user);
+    if (norm(mesh.nodes[static_cast<std::size_t>(end)] - mesh.nodes[static_cast<std::size_t>(nodes.front())]) == 0)
+      throw Error(user + ": its ends " + beam.from + " and " + beam.to + " are at the same place");
+    for (int i = 1; i < beam.elements; ++i)
+    {
+      nodes.push_back(static_cast<int>(mesh.nodes.size()));
+      mesh.nodes.push_back({});
+    }
+    nodes.push_back(end);
+    mesh.beams.push_back(std::move(nodes));
+  }
+  place_points(scene, mesh);
+}
+
 /// Adds the scene's superelements to the mesh. Throws Error for a retained node that meets no node of the groups it is
 /// joined to, or one that is taken.
 void add_superelements(const Scene& scene, Mesh& mesh)
@@ -133,11 +154,32 @@ Mesh read_mesh(const Scene& scene)
     throw Error("part '" + scene.parts.front().name + "' needs a mesh: add [mesh] file = \"...\"");
   for (const Point& point : scene.points) add_point(point.name, point.at, mesh);
   for (const RigidBody& body : scene.rigid_bodies) add_point(body.name, body.at, mesh);
+  for (const Coupling& coupling : scene.couplings) add_point(coupling.name, coupling.at, mesh);
   if (mesh.nodes.empty()) throw Error("the scene has neither a mesh nor points: nothing to compute");
   for (const RigidBody& body : scene.rigid_bodies) // whose nodes are found by any group
     for (const std::string& name : body.surfaces) (void)named_faces(mesh, name, "rigid body '" + body.name + "'");
+  add_beams(scene, mesh);
   add_superelements(scene, mesh);
   return mesh;
+}
+
+void place_points(const Scene& scene, Mesh& mesh)
+{
+  const auto place_all = [&](const auto& list)
+  {
+    for (const auto& entry : list) mesh.nodes[static_cast<std::size_t>(mesh.points.at(entry.name))] = entry.at;
+  };
+  place_all(scene.points);
+  place_all(scene.rigid_bodies);
+  place_all(scene.couplings);
+  for (const std::vector<int>& nodes : mesh.beams)
+  {
+    const auto at = [&](int node) -> Vec3& { return mesh.nodes[static_cast<std::size_t>(node)]; };
+    const Vec3 first = at(nodes.front()), last = at(nodes.back());
+    const auto count = static_cast<double>(nodes.size() - 1);
+    for (std::size_t i = 1; i + 1 < nodes.size(); ++i)
+      at(nodes[i]) = first + static_cast<double>(i) / count * (last - first);
+  }
 }
 
 double diagonal_of(const std::vector<Vec3>& nodes)
@@ -152,7 +194,7 @@ int point_node(const Mesh& mesh, const std::string& name, const std::string& use
   if (const auto point = mesh.points.find(name); point != mesh.points.end()) return point->second;
   std::vector<std::string> known;
   add_keys(mesh.points, known);
-  throw Error(user + ": there is no point or rigid body \"" + name + "\"" + spelling_hint(name, known));
+  throw Error(user + ": there is no point, rigid body or coupling \"" + name + "\"" + spelling_hint(name, known));
 }
 
 std::vector<int> named_nodes(const Mesh& mesh, const std::string& name, const std::string& user)
@@ -193,6 +235,7 @@ void broadcast_mesh(Mesh& mesh, MPI_Comm comm)
   broadcast_packed(mesh.node_groups, comm);
   broadcast_packed(mesh.dimensions, comm);
   broadcast_packed(mesh.points, comm);
+  broadcast_packed(mesh.beams, comm);
   broadcast_packed(mesh.superelements, comm);
 }
 

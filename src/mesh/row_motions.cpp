@@ -60,6 +60,22 @@ std::vector<NodeMotion> read_row_motions(const std::filesystem::path& file)
   return motions;
 }
 
+std::vector<PlacedGap> read_gaps(const std::filesystem::path& file)
+{
+  std::vector<PlacedGap> gaps;
+  for_each_line(file,
+                [&](const std::string& line, const std::string& place)
+                {
+                  std::istringstream words(line);
+                  auto& [at, gap] = gaps.emplace_back();
+                  std::string rest;
+                  const bool is_form = (words >> at[0] >> at[1] >> at[2] >> gap) && !(words >> rest);
+                  if (!is_form || !std::isfinite(norm(at) + gap))
+                    throw Error(place + ": '" + shortened(line) + "': expected x, y, z and the gap in m");
+                });
+  return gaps;
+}
+
 std::vector<PlacedNode> read_placed_nodes(const std::filesystem::path& file)
 {
   std::vector<PlacedNode> nodes;

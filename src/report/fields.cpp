@@ -231,6 +231,16 @@ public:
     on_file([&](Hdf5File& file) { file.write(data, values, 3); });
   }
 
+  /// Writes the displacement of nodes at rest, with what supports move them by, as a field for ParaView.
+  void write_rest(Vec u, const std::string& data, const std::string& name)
+  {
+    std::vector<double> values = nodal(u);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i] += model_.dofs.shift_of(static_cast<PetscInt>(6 * (i / 3) + i % 3));
+    on_file([&](Hdf5File& file) { file.write(data, values, 3); });
+    layout.still.push_back({name, data, 3});
+  }
+
   /// Writes a field that ParaView shows at all times.
   void write_still(Vec u, const std::string& data, const std::string& name)
   {
@@ -329,7 +339,7 @@ void write_fields(const Report& report, const Scene& scene, const Model& model, 
           file.write(format("modes/%d/pair_power", ++number), causes.pair_powers);
       });
   if (equilibrium.u.get())
-    fields.write_still(equilibrium.u, "equilibrium/displacement", "displacement at equilibrium [m]");
+    fields.write_rest(equilibrium.u, "equilibrium/displacement", "displacement at equilibrium [m]");
   write_modes(fields, report.point.modes);
   if (has_run(report.motion.settled.outcome))
     write_motion_shapes(fields, report.motion.settled.shapes, model.structure.load);

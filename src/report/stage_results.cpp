@@ -29,6 +29,13 @@ void add_contact(Entry out, const Contact& contact, const ContactResultant& resu
     out.show("torque", "N m", "torque with which it brakes its rotation", resultant.torque);
 }
 
+void add_bolt(Entry out, const BoltResult& bolt)
+{
+  out.show("name", "text", "name of the bolt", bolt.name);
+  out.show("tension", "N", "its tension at equilibrium", bolt.tension);
+  out.show("shortening", "m", "by which its shank was shortened", bolt.shortening);
+}
+
 void add_history(Entry out, const LoadHistory& history)
 {
   out.show("stick", "-", "pairs without a drive that stick in the last increment", history.stick);
@@ -122,6 +129,7 @@ void add_equilibrium(Entry whole, const Report& report)
   if (out.has(found.history.has_value()))
     add_history(out.group("undriven_pairs"), found.history.value_or(LoadHistory{}));
   out.list("contacts", add_contact, out.scene().contacts, report.contacts);
+  if (out.has(!report.bolts.empty())) out.list("bolts", add_bolt, report.bolts);
   add_probes(out, "probes", "displacement of the probe at equilibrium", report.equilibrium_probes);
   if (found.uniqueness == Uniqueness::not_assured)
     out.warn("with this much friction other equilibria may exist beside this one");

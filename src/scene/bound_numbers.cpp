@@ -42,6 +42,7 @@ std::span<double> numbers_of(const Target& target, WordsLeft& words)
   if (Vec3* const* vector = std::get_if<Vec3*>(&target)) return **vector;
   if (auto* const* vector = std::get_if<std::optional<Vec3>*>(&target)) return ***vector;
   if (auto* const* list = std::get_if<std::array<double, 6>*>(&target)) return **list;
+  if (auto* const* list = std::get_if<std::vector<double>*>(&target)) return **list;
   auto* const* vectors = std::get_if<std::vector<Vec3>*>(&target);
   const auto place = vectors && !words.empty() ? place_in((*vectors)->size(), words.front()) : std::nullopt;
   if (!place) return {};
@@ -54,6 +55,7 @@ std::string kind_of_target(const Target& target)
   if (std::holds_alternative<bool*>(target)) return "true or false";
   const bool is_list = std::holds_alternative<Vec3*>(target) || std::holds_alternative<std::optional<Vec3>*>(target) ||
                        std::holds_alternative<std::array<double, 6>*>(target) ||
+                       std::holds_alternative<std::vector<double>*>(target) ||
                        std::holds_alternative<std::vector<Vec3>*>(target);
   return is_list ? a_list : "text";
 }
@@ -108,7 +110,8 @@ void finish_list(const FoundValue& number, const std::string& place)
   const std::span<double> entries = number.entries;
   const auto fail = [&](const std::string& expected)
   { refuse_value(number.key, place, text_of_number(*number.number), expected); };
-  if (entries.size() == 6 && std::min({entries[0], entries[1], entries[2]}) < 0) fail("no negative xx, yy or zz");
+  if (number.key.name == "inertia" && std::min({entries[0], entries[1], entries[2]}) < 0)
+    fail("no negative xx, yy or zz");
   if (number.key.rule != Rule::direction) return;
   const double length = std::hypot(entries[0], entries[1], entries[2]);
   if (length == 0) fail("a direction, not the zero vector");
@@ -173,6 +176,7 @@ Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers)
   Places places{scene.file.string(), {}};
   for (const Part& part : changed.parts)
     if (!part.material.orthotropy) places.given[&part.material.poisson] = places.file;
+  for (const Force& force : changed.forces) places.given[&force.vector] = places.file;
   for (const auto& [key, value] : numbers)
   {
     const std::string given = "--set " + key + "=" + text_of_number(value);

@@ -22,6 +22,7 @@ public:
     for (const Point& point : scene.points) points_.push_back(point.name);
     nodes_ = points_;
     for (const RigidBody& body : scene.rigid_bodies) nodes_.push_back(body.name);
+    for (const Coupling& coupling : scene.couplings) nodes_.push_back(coupling.name);
   }
 
   void check_all() const
@@ -34,7 +35,7 @@ public:
     if (!scene_.mesh && !scene_.matrices)
     {
       for (const Support& support : scene_.supports) need_known(support.on, points_, &support.on, "[[support]] on");
-      for (const Force& force : scene_.forces) need_known(force.on, points_, &force.on, "[[force]] on");
+      for (const Force& force : scene_.forces) need_known(force.on, nodes_, &force.on, "[[force]] on");
     }
     for (const Contact& contact : scene_.contacts) check_contact(contact);
     check_contacts_differ();
@@ -49,7 +50,7 @@ public:
                                               : &scene_.friction.static_coefficient,
               "[friction]");
     check_damping();
-    check_loss();
+    check_joining(scene_, places_);
     check_transient();
     check_cycle();
     if (scene_.response) check_response(*scene_.response);
@@ -90,7 +91,13 @@ private:
     refuse(s.parts, "part", why);
     refuse(s.points, "point", why);
     refuse(s.rigid_bodies, "rigid_body", why);
+    refuse(s.couplings, "coupling", why);
     refuse(s.springs, "spring", why);
+    refuse(s.connectors, "connector", why);
+    refuse(s.beams, "beam", why);
+    refuse(s.masses, "mass", why);
+    refuse(s.bolts, "bolt", why);
+    if (s.gravity != Vec3{}) fail(&s.gravity, "gravity " + why);
     refuse(s.superelements, "superelement", why);
     refuse(s.pressures, "pressure", why);
     refuse(s.contacts, "contact", why);
@@ -131,10 +138,13 @@ private:
 
   void check_names() const
   {
-    std::set<std::string> parts, nodes = {ground}, superelements, probes; // springs refer to the ground
+    std::set<std::string> parts, nodes = {ground}, superelements, probes, beams, bolts; // springs refer to the ground
     need_different(scene_.parts, "part", parts);
     need_different(scene_.points, "point", nodes);
     need_different(scene_.rigid_bodies, "rigid_body", nodes);
+    need_different(scene_.couplings, "coupling", nodes);
+    need_different(scene_.beams, "beam", beams);
+    need_different(scene_.bolts, "bolt", bolts);
     need_different(scene_.superelements, "superelement", superelements);
     need_different(scene_.probes, "probe", probes);
   }
@@ -197,8 +207,11 @@ private:
   {
     std::vector<std::string> ends = nodes_;
     ends.push_back(ground);
-    need_known(spring.from, ends, &spring.from, "[[spring]] from");
-    need_known(spring.to, ends, &spring.to, "[[spring]] to");
+    if (!scene_.mesh) // whose groups are known later
+    {
+      need_known(spring.from, ends, &spring.from, "[[spring]] from");
+      need_known(spring.to, ends, &spring.to, "[[spring]] to");
+    }
     if (spring.from == spring.to)
       fail(&spring.from, "[[spring]] from and to are both \"" + spring.from + "\"; it would do nothing");
     if (spring.stiffness == 0 && spring.damping == 0)
@@ -284,7 +297,8 @@ private:
   void check_damping() const
   {
     const RayleighDamping& damping = scene_.damping;
-    const bool needed = std::ranges::any_of(scene_.parts, [](const Part& part) { return !part.damping; });
+    const bool needed =
+        !scene_.beams.empty() || std::ranges::any_of(scene_.parts, [](const Part& part) { return !part.damping; });
     if (needed || scene_.matrices || !scene_.superelements.empty()) return;
     const std::string why = scene_.parts.empty()
                                 ? "it is of [[part]]s, and the scene has none; give each [[spring]] its damping"
@@ -294,25 +308,6 @@ private:
     if (!damping.measured.empty()) refuse(&damping.measured, "measured");
     if (damping.alpha != 0) refuse(&damping.alpha, "alpha");
     if (damping.beta != 0) refuse(&damping.beta, "beta");
-  }
-
-  void check_loss() const
-  {
-    constexpr double largest_loss = 10; // rubbers at their glass transition reach 2
-    const double frequency = scene_.damping.loss_frequency;
-    for (const Part& part : scene_.parts)
-      if (part.loss_factor > largest_loss)
-        fail(&part.loss_factor,
-             format("[[part]] %s loss_factor = %g is no material's: those of rubber reach 2; give a number up to %g",
-                    part.name.c_str(), part.loss_factor, largest_loss));
-    const auto lossy = std::ranges::find_if(scene_.parts, [](const Part& part) { return part.loss_factor > 0; });
-    if (lossy != scene_.parts.end() && frequency == 0)
-      fail(&lossy->loss_factor, "[[part]] " + lossy->name +
-                                    " loss_factor needs [damping] loss_frequency, at which time steps and the "
-                                    "estimate take its viscous equivalent: give the squeal's frequency");
-    if (lossy == scene_.parts.end() && frequency > 0)
-      fail(&scene_.damping.loss_frequency, "[damping] loss_frequency belongs to a [[part]] with a loss_factor: give "
-                                           "one, or take it out");
   }
 
   void check_frame(const Contact& contact) const

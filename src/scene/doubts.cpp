@@ -50,7 +50,8 @@ template <class Body> void doubt_masses(const std::vector<Body>& bodies, std::ve
 void doubt_loads(const Scene& scene, std::vector<std::string>& doubts)
 {
   for (const Force& force : scene.forces)
-    if (force.vector == Vec3{}) doubts.push_back("the force on '" + shortened(force.on) + "' is 0 N");
+    if (force.vector == Vec3{} && force.moment == Vec3{})
+      doubts.push_back("the force on '" + shortened(force.on) + "' is 0 N");
   for (const Pressure& pressure : scene.pressures)
     if (pressure.value == 0) doubts.push_back("the pressure on '" + shortened(pressure.on) + "' is 0 Pa");
   const std::vector<double>& factors = scene.transient.ramps.load.value;

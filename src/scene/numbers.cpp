@@ -14,8 +14,9 @@ namespace
 {
 
 /// Tables whose numbers are of the structure, its contact and its loads.
-const std::vector<std::string> physical = {"part",     "point",   "rigid_body", "spring", "force",
-                                           "pressure", "contact", "friction",   "damping"};
+const std::vector<std::string> physical = {"part",    "point",   "rigid_body", "coupling", "spring",   "connector",
+                                           "beam",    "mass",    "support",    "force",    "pressure", "bolt",
+                                           "gravity", "contact", "friction",   "damping"};
 
 /// Tables on which the mesh or the given matrices depend.
 constexpr std::array of_the_mesh = {"mesh", "matrices"};
@@ -182,7 +183,11 @@ const std::vector<TableNumbers> derived_by = {
     {"part", {"young", "density", "loss_factor", "alpha", "beta", "rotation.rate"}},
     {"point", {"mass"}},
     {"rigid_body", {"mass"}},
+    {"coupling", {"mass"}},
     {"spring", {"stiffness", "damping"}},
+    {"connector", {"loss_factor"}},
+    {"beam", {"young", "density", "loss_factor"}},
+    {"mass", {"mass"}},
     {"contact", {"rotation.rate"}}};
 
 /// Numbers that the mass and the stiffness of a component are linear in.
@@ -192,17 +197,28 @@ const std::vector<TableNumbers> linear_in = {
       "orthotropic.shear.1", "orthotropic.shear.2"}},
     {"point", {"mass"}},
     {"rigid_body", {"mass", "inertia.0", "inertia.1", "inertia.2", "inertia.3", "inertia.4", "inertia.5"}},
-    {"spring", {"stiffness"}}};
+    {"coupling", {"mass", "inertia.0", "inertia.1", "inertia.2", "inertia.3", "inertia.4", "inertia.5"}},
+    {"spring", {"stiffness"}},
+    {"connector", {"stiffness"}},
+    {"beam", {"density", "young"}},
+    {"mass", {"mass"}}};
 
-/// An entry's numbers that are not zero.
+/// An entry's numbers that are not zero; of a list all of them.
 std::vector<SceneNumber> numbers_in(Scene& scene, const EntryKey& entry, const std::vector<const char*>& keys)
 {
   std::vector<SceneNumber> numbers;
+  const auto add = [&](const std::string& key)
+  {
+    const FoundValue found = find_value(scene, key);
+    if (found.number && *found.number != 0) numbers.push_back({key, *found.number});
+    return found.number != nullptr;
+  };
   for (const char* own : keys)
   {
     const std::string key = entry.key + "." + own;
-    if (const FoundValue found = find_value(scene, key); found.number && *found.number != 0)
-      numbers.push_back({key, *found.number});
+    if (add(key)) continue;
+    int entry_of_list = 0;
+    while (add(key + "." + std::to_string(entry_of_list))) ++entry_of_list;
   }
   return numbers;
 }

@@ -21,7 +21,8 @@ template <class Entry> std::string title_of(const Entry& entry)
     return entry.name;
   else if constexpr (requires { entry.stator; })
     return entry.stator + " on " + entry.rotor;
-  else if constexpr (requires { entry.direction, entry.to; })
+  else if constexpr (
+      requires { entry.direction, entry.to; } || requires { entry.locked, entry.to; })
     return entry.from + " to " + entry.to;
   else if constexpr (requires { entry.on; })
     return "on " + entry.on;
@@ -94,6 +95,8 @@ SceneKeys keys_of(Orthotropy& o)
       {"shear", &o.shear, "Pa", "G12, G13, G23", required},
       {"axis_1", &o.axis_1, "-", "direction of the first axis: x, y, z or a vector", direction},
       {"axis_2", &o.axis_2, "-", "direction of the second one, square to it; the third is square to both", direction},
+      {"cylinder", braces(o.cylinder), "table",
+       "instead of both axes, the first one radial and the second tangential: {axis, centre}", stiffness_and_mass},
   };
 }
 
@@ -152,14 +155,15 @@ SceneKeys keys_of(RigidBody& b)
       {"mass", &b.mass, "kg", "mass at the reference point", not_negative, mass},
       {"inertia", &b.inertia, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about the reference point", mass},
       {"free", &b.free, "motions", "motions that are free: any of x y z rx ry rz, or all, none", required},
+      {"motions", &b.motions, "motions", "motions of the surfaces' nodes that follow it; the others are their own"},
   };
 }
 
 SceneKeys keys_of(Spring& s)
 {
   return {
-      {"from", &s.from, "text", "point or rigid body", required},
-      {"to", &s.to, "text", "point, rigid body or ground"},
+      {"from", &s.from, "text", "point, rigid body, coupling, or named group, whose nodes share the spring", required},
+      {"to", &s.to, "text", "the same, or ground; one end at most is a group"},
       {"direction", &s.direction, "-", "line of action: x, y, z or a vector", required, direction, stiffness_and_mass},
       {"stiffness", &s.stiffness, "N/m", "stiffness of the spring", not_negative, stiffness_and_mass},
       {"damping", &s.damping, "N s/m", "constant of the dashpot", not_negative, damping},
@@ -183,6 +187,12 @@ SceneKeys keys_of(Support& s)
   return {
       {"on", &s.on, "text", "named group or point; rows or nodes of a matrix scene", required},
       {"fixed", &s.fixed, "motions", "motions that are held: any of x y z rx ry rz, or all", required},
+      {"axis_1", &s.frame.axis_1, "-", "x of its motions: x, y, z or a vector", direction, mesh},
+      {"axis_2", &s.frame.axis_2, "-", "y of its motions, square to it; z is square to both", direction, mesh},
+      {"cylinder", braces(s.frame.cylinder), "table",
+       "instead of both axes, x radial, y tangential and z along it at each node: {axis, centre}", mesh},
+      {"displacement", &s.displacement, "m", "of fixed x y z; no load factor scales it", load},
+      {"rotation", &s.rotation, "rad", "of fixed rx ry rz, likewise", load},
   };
 }
 
@@ -191,7 +201,8 @@ SceneKeys keys_of(Force& f)
   return {
       {"on", &f.on, "text",
        "point, rigid body, or named group, whose nodes share the force; rows or nodes of a matrix scene", required},
-      {"vector", &f.vector, "N", "the whole force", required, load},
+      {"vector", &f.vector, "N", "the whole force", load},
+      {"moment", &f.moment, "N m", "the whole moment, on what rotates; one of both is needed", load},
   };
 }
 
@@ -209,6 +220,8 @@ SceneKeys keys_of(Contact& c)
       {"rotor", &c.rotor, "text", "named surface or point that the drive moves", required},
       {"stator", &c.stator, "text", "named surface or point that slides on it", required},
       {"gap", &c.gap, "m", "initial gap, positive when open", gap},
+      {"gap_file", &c.gap_file, "path",
+       "text file with a line `x y z gap` in m for each node of the slave side; they add to the gap", file},
       {"reach", &c.reach, "m", "largest distance of the surfaces along the normal; it adds to the gap", not_negative,
        mesh},
       {"normal", &c.normal, "-",
@@ -243,6 +256,9 @@ SceneKeys keys_of(LoadStep& s)
       {"friction", &s.friction, "-",
        "factor at the step's end on the friction of driven contacts: 0 while the rotor is at rest; 1 in the last step",
        not_negative},
+      {"bolts", &s.bolts, "texts",
+       "bolts that have their tension at the step's end; the others keep their length. When no step names any, all are "
+       "tightened before the first"},
   };
 }
 
@@ -321,16 +337,22 @@ SceneKeys keys_of(Scene& scene)
       {"accuracy", &scene.accuracy, "-",
        "relative error that fidelity = \"auto\" may leave in the cycle's frequency and mean fluctuating energy",
        positive},
+      {"gravity", &scene.gravity, "m/s2", "acceleration of gravity; no load factor scales it", load},
       section("mesh", scene.mesh, "a mesh and how to read it"),
       section("matrices", scene.matrices, "matrices of another code instead of a mesh"),
       section("part", scene.parts, "a named volume of the mesh, or a named surface with a thickness (shell)"),
       section("point", scene.points, "a node of its own: a point mass, or an end of springs"),
       section("rigid_body", scene.rigid_bodies, "named surfaces that move as one rigid body"),
-      section("spring", scene.springs, "spring and dashpot between two points or rigid bodies, or to \"ground\""),
+      section("coupling", scene.couplings, "a point that follows the mean motion of nodes, and loads them alike"),
+      section("spring", scene.springs, "spring and dashpot between points, rigid bodies or a group, or to \"ground\""),
+      section("connector", scene.connectors, "a joint or bushing between two points or bodies, or to \"ground\""),
+      section("beam", scene.beams, "a straight beam between two points or bodies"),
+      section("mass", scene.masses, "mass shared by the nodes of a group"),
       section("superelement", scene.superelements, "a reduced structure of another code, joined to nodes"),
       section("support", scene.supports, "fixed motions of a named group or point"),
       section("force", scene.forces, "force on a point, a rigid body or a named group"),
       section("pressure", scene.pressures, "pressure on a named surface"),
+      section("bolt", scene.bolts, "a bolt that is tightened and then keeps its length"),
       section("contact", scene.contacts, "two named surfaces or two points in contact with friction"),
       section("step", scene.steps, "a step on the way to the loads; undriven contacts depend on their order"),
       section("initial", scene.initial, "a displacement or velocity that the transient starts with"),

@@ -126,6 +126,14 @@ bool has_unit(const std::string& unit);
 /// Returns the keys of a scene file, its tables in the order in which they are written.
 SceneKeys keys_of(Scene& scene);
 
+/// Keys of what joins bodies.
+SceneKeys keys_of(Axis& axis);
+SceneKeys keys_of(Coupling& coupling);
+SceneKeys keys_of(Connector& connector);
+SceneKeys keys_of(Beam& beam);
+SceneKeys keys_of(AddedMass& mass);
+SceneKeys keys_of(Bolt& bolt);
+
 /// Keys of the tables of stages and studies.
 SceneKeys keys_of(ModesSettings& modes);
 SceneKeys keys_of(EstimateSettings& estimate);
@@ -151,6 +159,9 @@ struct Places
 
 /// Throws Error on contradictions between keys: undefined or repeated names, tables that exclude each other.
 void check_scene(const Scene& scene, const Places& places);
+
+/// Of what joins bodies, of the frames of supports and of loss factors.
+void check_joining(const Scene& scene, const Places& places);
 
 /// Gives undriven contacts without a friction of their own that of the scene, which sweeps then change elsewhere alone.
 void resolve_friction(Scene& scene);

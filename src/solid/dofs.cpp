@@ -3,6 +3,7 @@
 /// Rigid body:       u = u_ref + theta x (x - x_ref); the rotations of a shell node are theta.
 /// Tie:              a slave node follows nodes of the master, a shell's edge with its rotations
 ///                   (squeal/mesh/ties.hpp).
+/// Coupling, joint, support in a frame: rows of their own (constraints.hpp).
 /// Shell on a solid: a node of both rotates with the solid nodes around it, those of the solid elements that hold it,
 /// by
 ///                   their least-squares rotation
@@ -11,6 +12,7 @@
 ///                   couple (I^-1 moment) x r_i. I is regular because no solid element is a line.
 #include "squeal/solid/dofs.hpp"
 
+#include "constraints.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/ties.hpp"
@@ -19,36 +21,12 @@
 #include <algorithm>
 #include <Eigen/Dense>
 #include <numeric>
-#include <unordered_map>
 
 namespace squeal
 {
 
 namespace
 {
-
-enum class DofKind : char
-{
-  absent, // the node has no such component
-  free,
-  fixed,
-  dependent, // a linear combination of others
-};
-
-struct ConstraintTerm
-{
-  PetscInt nodal_dof = 0;
-  double factor = 0; // [-, m, 1/m]
-};
-
-struct Constraints
-{
-  std::vector<DofKind> kind; // of each nodal degree of freedom
-  std::unordered_map<PetscInt, std::vector<ConstraintTerm>> dependent;
-  std::unordered_map<int, int> body_of; // rigid body of a node on its surfaces
-
-  DofKind& kind_of(int node, int component) { return kind[6 * PetscInt{node} + component]; }
-};
 
 Vec3 unit(int axis)
 {
@@ -75,6 +53,8 @@ Constraints unconstrained(const Mesh& mesh, const Scene& scene)
     set_components(constraints, point_node(mesh, point.name, "point"), point.free);
   for (const RigidBody& body : scene.rigid_bodies)
     set_components(constraints, point_node(mesh, body.name, "rigid body"), body.free);
+  for (const std::vector<int>& nodes : mesh.beams)
+    for (std::size_t i = 1; i + 1 < nodes.size(); ++i) set_components(constraints, nodes[i], every_motion);
   for (std::size_t i = 0; i < mesh.superelements.size(); ++i)
     for (const SuperelementRow& row : mesh.superelements[i])
     {
@@ -88,19 +68,13 @@ Constraints unconstrained(const Mesh& mesh, const Scene& scene)
   return constraints;
 }
 
-void make_dependent(Constraints& constraints, PetscInt nodal_dof, std::vector<ConstraintTerm> terms)
-{
-  constraints.kind[nodal_dof] = DofKind::dependent;
-  constraints.dependent[nodal_dof] = std::move(terms);
-}
-
 /// Makes the components of a node depend on those of a rigid body's reference point.
-void attach_node(Constraints& constraints, const Mesh& mesh, int node, int reference)
+void attach_node(Constraints& constraints, const Mesh& mesh, int node, int reference, const Motions& motions)
 {
   const Vec3 r = mesh.nodes[node] - mesh.nodes[reference];
   for (int c = 0; c < 6; ++c)
   {
-    if (constraints.kind_of(node, c) == DofKind::absent) continue;
+    if (constraints.kind_of(node, c) == DofKind::absent || !motions[static_cast<std::size_t>(c)]) continue;
     std::vector<ConstraintTerm> terms{{6 * PetscInt{reference} + c, 1}};
     for (int axis = 0; axis < 3 && c < 3; ++axis)
       terms.push_back({6 * PetscInt{reference} + 3 + axis, cross(unit(axis), r)[c]});
@@ -122,7 +96,7 @@ void add_rigid_bodies(Constraints& constraints, const Mesh& mesh, const std::vec
         if (other != i)
           throw Error(node_text(node, mesh.nodes[node]) + " belongs to rigid body " + bodies[other].name + " and to " +
                       user + "; give each a surface of its own, or make them one body");
-        if (is_new) attach_node(constraints, mesh, node, reference);
+        if (is_new) attach_node(constraints, mesh, node, reference, bodies[i].motions);
       }
   }
 }
@@ -160,7 +134,7 @@ void add_supports(Constraints& constraints, const Mesh& mesh, const Scene& scene
   {
     for (const Support& support : scene.supports)
       for (const int node : named_nodes(mesh, support.on, "support"))
-        for (int c = 0; c < 6; ++c)
+        for (int c = 0; c < 6 && is_plain(support); ++c)
           if (support.fixed[c]) work(support.on, 6 * PetscInt{node} + c);
   };
   for (const Support& support : scene.supports) check_effective(constraints, mesh, support);
@@ -298,19 +272,7 @@ std::vector<PetscInt> number_free(const Constraints& constraints, const std::vec
   return number;
 }
 
-/// Adds factor * u(nodal_dof) to a row of T. A dependent degree of freedom may depend on another, as the rotation of a
-/// joint on the solid nodes of a rigid body, but never on itself.
-void add_terms(const Constraints& constraints, const std::vector<PetscInt>& number, PetscInt nodal_dof, double factor,
-               std::map<PetscInt, double>& row)
-{
-  const DofKind kind = constraints.kind[nodal_dof];
-  if (kind == DofKind::free) row[number[nodal_dof]] += factor;
-  if (kind != DofKind::dependent) return;
-  for (const ConstraintTerm& term : constraints.dependent.at(nodal_dof))
-    if (term.factor != 0) add_terms(constraints, number, term.nodal_dof, factor * term.factor, row);
-}
-
-/// Sets the rows of T.
+/// Sets the rows of T, and the shift.
 void set_terms(const Constraints& constraints, const std::vector<PetscInt>& number, DofMap& dofs)
 {
   const auto nodal_dofs = static_cast<PetscInt>(constraints.kind.size());
@@ -322,12 +284,21 @@ void set_terms(const Constraints& constraints, const std::vector<PetscInt>& numb
       dofs.terms.push_back({number[i], 1});
     else if (constraints.kind[i] == DofKind::dependent)
     {
-      std::map<PetscInt, double> row;
-      add_terms(constraints, number, i, 1, row);
+      FreeSum sum;
+      add_expanded(constraints, i, 1, sum);
+      std::map<PetscInt, double> row; // in the order of the free ones
+      for (const auto& [nodal_dof, factor] : sum.factors) row[number[nodal_dof]] = factor;
       for (const auto& [dof, factor] : row)
         if (factor != 0) dofs.terms.push_back({dof, factor});
     }
     dofs.offsets.push_back(dofs.terms.size());
+  }
+  if (constraints.shift.empty()) return;
+  for (PetscInt i = 0; i < nodal_dofs; ++i)
+  {
+    FreeSum sum;
+    add_expanded(constraints, i, 1, sum);
+    dofs.shift.push_back(sum.constant);
   }
 }
 
@@ -346,6 +317,13 @@ void name_nodes(const Mesh& mesh, const Scene& scene, DofNames& names)
   };
   for (const Point& point : scene.points) name_point("point", point.name);
   for (const RigidBody& body : scene.rigid_bodies) name_point("rigid body", body.name);
+  for (const Coupling& coupling : scene.couplings) name_point("coupling", coupling.name);
+  for (std::size_t i = 0; i < mesh.beams.size(); ++i)
+  {
+    for (std::size_t k = 1; k + 1 < mesh.beams[i].size(); ++k)
+      names.body[static_cast<std::size_t>(mesh.beams[i][k])] = static_cast<int>(names.bodies.size());
+    names.bodies.push_back("beam " + scene.beams[i].name);
+  }
   for (std::size_t i = 0; i < mesh.superelements.size(); ++i)
   {
     for (const SuperelementRow& row : mesh.superelements[i])
@@ -389,8 +367,10 @@ DofMap number_dofs(const Mesh& mesh, const Scene& scene, const Partition& partit
   Constraints constraints = unconstrained(mesh, scene);
   add_rigid_bodies(constraints, mesh, scene.rigid_bodies);
   add_supports(constraints, mesh, scene);
+  add_couplings(constraints, mesh, scene.couplings);
   add_ties(constraints, mesh, scene);
   join_shells_to_solids(constraints, mesh);
+  add_rows(constraints, mesh, scene);
   DofMap dofs;
   const auto number = number_free(constraints, partition.node_rank, dofs, comm);
   if (dofs.size == 0) throw Error("nothing is free to move: supports and points hold every motion of the scene");

@@ -28,9 +28,9 @@ auto condense_parameters(std::vector<StrainPoint<Strains>>& points, const std::v
                          const Elasticity& D)
 {
   constexpr int parameters = ParameterStrains::ColsAtCompileTime, dofs = Strains::ColsAtCompileTime;
-  using Coupling = Eigen::Matrix<double, parameters, dofs>;
+  using Parameters = Eigen::Matrix<double, parameters, dofs>;
   Eigen::Matrix<double, parameters, parameters> H;
-  Coupling G;
+  Parameters G;
   H.setZero();
   G.setZero();
   for (std::size_t p = 0; p < points.size(); ++p)
@@ -39,7 +39,7 @@ auto condense_parameters(std::vector<StrainPoint<Strains>>& points, const std::v
     H += stress.transpose() * Ba[p];
     G += stress.transpose() * points[p].B;
   }
-  const Coupling a = -H.ldlt().solve(G);
+  const Parameters a = -H.ldlt().solve(G);
   for (std::size_t p = 0; p < points.size(); ++p) points[p].B += Ba[p] * a;
   return a;
 }

@@ -47,7 +47,7 @@ Matrix6 strain_rotation(const Eigen::Matrix3d& R)
 /// D = T' S^-1 T, S the compliance along the axes of the material.
 Matrix6 elasticity(const Orthotropy& material)
 {
-  const auto& [E, nu, G, axis_1, axis_2] = material;
+  const auto& [E, nu, G, axis_1, axis_2, cylinder] = material; // these axes are those at the element
   Matrix6 S = Matrix6::Zero();
   S.diagonal() << 1 / E[0], 1 / E[1], 1 / E[2], 1 / G[0], 1 / G[2], 1 / G[1];
   S(0, 1) = S(1, 0) = -nu[0] / E[0];

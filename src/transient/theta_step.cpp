@@ -75,6 +75,14 @@ std::vector<double> joint_work(const StepBatch& batch, const State& state, Vec v
   return work;
 }
 
+/// Work of what no load factor scales. Collective.
+double preload_work(const StepBatch& batch, const Structure& structure, Vec v_theta)
+{
+  double power = 0;
+  if (structure.preload.get()) check(VecDot(structure.preload, v_theta, &power));
+  return batch.step.h * (1 - batch.factors.load) * power;
+}
+
 /// Works of each step from the products at both ends; all reductions in one message.
 void account(const StepBatch& batch, const Structure& structure)
 {
@@ -93,7 +101,7 @@ void account(const StepBatch& batch, const Structure& structure)
     report.energy = (kinetic + potential) / 2;
     report.damping_work = damping / step.theta;
     report.contact_work = contact;
-    report.load_work = step.h * step_factors.load * load;
+    report.load_work = step.h * step_factors.load * load + preload_work(batch, structure, works[k].v_theta);
     report.drive_work = drive_work(batch, states[k]);
     report.joint_work = joint_work(batch, states[k], works[k].v_theta);
     report.energy_defect = report.energy - works[k].energy - (0.5 - step.theta) * (dMd + step.h * dKd) +
@@ -101,12 +109,14 @@ void account(const StepBatch& batch, const Structure& structure)
   }
 }
 
-/// The start of a step: A v_free = [M v - (1-theta) A v]/theta - h K u + h F, into A v_next. `factor`: on F.
+/// The start of a step: A v_free = [M v - (1-theta) A v]/theta - h K u + h F, into A v_next. `factor`: on F, but for
+/// its preload.
 void load_free_step(const ThetaStep& step, const Structure& structure, double factor, StepWork& work)
 {
   check(VecCopy(work.Mv, work.Av_next));
   check(VecAXPBYPCZ(work.Av_next, (step.theta - 1) / step.theta, -step.h, 1 / step.theta, work.Av, work.Ku));
   check(VecAXPY(work.Av_next, step.h * factor, structure.load));
+  if (structure.preload.get()) check(VecAXPY(work.Av_next, step.h * (1 - factor), structure.preload));
 }
 
 /// The rates of h, from a step that is complete: `account` left M dv and K du in Mv and Ku.

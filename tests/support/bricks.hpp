@@ -109,7 +109,7 @@ inline void append(Mesh& mesh, const Mesh& other)
     for (const int node : nodes) mesh.node_groups[name].push_back(first + node);
 }
 
-/// The nodes of the scene's points and rigid bodies, as read_mesh adds them.
+/// The nodes of the scene's points, rigid bodies, couplings and beams, as read_mesh adds them.
 inline void add_points(Mesh& mesh, const Scene& scene)
 {
   const auto add = [&](const std::string& name, const Vec3& at)
@@ -119,6 +119,19 @@ inline void add_points(Mesh& mesh, const Scene& scene)
   };
   for (const Point& point : scene.points) add(point.name, point.at);
   for (const RigidBody& body : scene.rigid_bodies) add(body.name, body.at);
+  for (const Coupling& coupling : scene.couplings) add(coupling.name, coupling.at);
+  for (const Beam& beam : scene.beams)
+  {
+    std::vector<int>& nodes = mesh.beams.emplace_back();
+    nodes.push_back(mesh.points.at(beam.from));
+    for (int i = 1; i < beam.elements; ++i)
+    {
+      nodes.push_back(static_cast<int>(mesh.nodes.size()));
+      mesh.nodes.emplace_back();
+    }
+    nodes.push_back(mesh.points.at(beam.to));
+  }
+  place_points(scene, mesh);
 }
 
 struct Built

@@ -57,7 +57,7 @@ struct SuperelementRow
 };
 
 /// Nodes, elements and named sets of them. Nodes of the file come first, then the scene's points, then the reference
-/// points of rigid bodies, then what carries the modal coordinates of superelements.
+/// points of rigid bodies and couplings, nodes within beams, then what carries modal coordinates of superelements.
 struct Mesh
 {
   std::vector<Vec3> nodes;                                 // [m]
@@ -65,7 +65,8 @@ struct Mesh
   std::map<std::string, std::vector<Face>> surfaces;       // of every named surface, those of shells included
   std::map<std::string, std::vector<int>> node_groups;     // nodes of every named group of any dimension, ascending
   std::map<std::string, std::vector<int>> dimensions;      // of every named group: 1 has curves, 3 solids, ascending
-  std::map<std::string, int> points;                       // node of every scene point and rigid body
+  std::map<std::string, int> points;                       // node of every scene point, rigid body and coupling
+  std::vector<std::vector<int>> beams;                     // nodes of each of the scene's, from end to end
   std::vector<std::vector<SuperelementRow>> superelements; // in the scene's order
 };
 
@@ -75,14 +76,17 @@ struct Mesh
 /// kernel, and solid elements in no part. It does so for a part or a body's surface that the mesh does not have.
 Mesh read_mesh(const Scene& scene);
 
+/// Puts points, reference points and the nodes of beams where the scene has them.
+void place_points(const Scene& scene, Mesh& mesh);
+
 /// Look-up of nodes and surfaces by the names that a scene uses. `user` says in messages which table of the scene asks,
 /// such as "spring" or "probe tip". Every function throws Error for an unknown name, with the nearest known one. The
 /// mesh must be whole.
 ///
-/// Returns the node of a point or rigid body.
+/// Returns the node of a point, rigid body or coupling.
 int point_node(const Mesh& mesh, const std::string& name, const std::string& user);
 
-/// Returns the node of a point or rigid body, or else the nodes of a group, ascending.
+/// Returns the node of a point, rigid body or coupling, or else the nodes of a group, ascending.
 /// Throws Error for a group of several dimensions, as of a surface and a volume of one name.
 std::vector<int> named_nodes(const Mesh& mesh, const std::string& name, const std::string& user);
 

@@ -1,6 +1,6 @@
 #pragma once
-/// What the rows of another code's matrices are, by the text files beside them. Not collective: the caller reads on
-/// rank 0.
+/// Text files of lines: what the rows of another code's matrices are, and gaps of nodes. Not collective: the caller
+/// reads on rank 0.
 #include "squeal/base/vec3.hpp"
 
 #include <filesystem>
@@ -26,6 +26,16 @@ struct PlacedNode
   long node = -1; // its number
   Vec3 at{};      // [m]
 };
+
+/// The gap of the node at a place.
+struct PlacedGap
+{
+  Vec3 at{};      // [m]
+  double gap = 0; // [m]
+};
+
+/// Returns the gaps in a file, which has a line "x y z gap" for each. Throws Error with the line that is wrong.
+std::vector<PlacedGap> read_gaps(const std::filesystem::path& file);
 
 /// Returns the nodes in a `nodes.txt`, which has a line "node x y z" for each. Throws Error with the line that is
 /// wrong.

@@ -55,6 +55,14 @@ struct CoarseStart
   std::optional<GivenStart> carried{}; // on the scene's own mesh
 };
 
+/// A bolt at the equilibrium.
+struct BoltResult
+{
+  std::string name;
+  double tension = 0;    // [N]
+  double shortening = 0; // [m] of its shank
+};
+
 /// Each result is written once, and no stage reads it here. A stage that did not run has the outcome "off" (by the
 /// scene) or "skipped", with the reason.
 struct Report
@@ -66,6 +74,7 @@ struct Report
   SlidingPoint point;
   std::vector<ContactResultant> contacts; // of the equilibrium, one a contact of the scene; empty on a matrix scene
   std::vector<double> equilibrium_probes; // [m] at the equilibrium, one a probe
+  std::vector<BoltResult> bolts;          // at the equilibrium
   Response response;
   Trajectory transient;
   CoarseStart coarse;

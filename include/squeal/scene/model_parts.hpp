@@ -18,17 +18,34 @@ namespace squeal
 using Motions = std::array<bool, 6>;
 
 inline constexpr std::array motion_words = {"x", "y", "z", "rx", "ry", "rz"};
+inline constexpr Motions every_motion = {true, true, true, true, true, true};
 inline constexpr const char *all_motions = "all", *no_motions = "none"; // instead of a list of them
+
+/// The axis of a cylindrical frame.
+struct Axis
+{
+  Vec3 axis{};   // [-] unit vector
+  Vec3 centre{}; // [m] a point of it
+};
+
+/// A local frame with the axes 1, 2 and 3 = 1 x 2.
+struct Frame
+{
+  Vec3 axis_1 = {1, 0, 0};        // [-] unit
+  Vec3 axis_2 = {0, 1, 0};        // [-] unit, square to axis_1
+  std::optional<Axis> cylinder{}; // if given, axis 1 is radial, 2 tangential, 3 along it, at each place
+};
 
 /// Nine constants of orthotropic elasticity along the axes 1, 2 and 3 = 1 x 2. A stress along i alone strains i by
 /// stress/E_i and j by -nu_ij stress/E_i; nu_ij/E_i = nu_ji/E_j.
 struct Orthotropy
 {
-  Vec3 young{};            // [Pa] E1 E2 E3
-  Vec3 poisson{};          // [-] nu12 nu13 nu23: contraction along the second axis under tension along the first
-  Vec3 shear{};            // [Pa] G12 G13 G23
-  Vec3 axis_1 = {1, 0, 0}; // [-] unit
-  Vec3 axis_2 = {0, 1, 0}; // [-] unit, square to axis_1
+  Vec3 young{};                   // [Pa] E1 E2 E3
+  Vec3 poisson{};                 // [-] nu12 nu13 nu23: contraction along the second axis under tension along the first
+  Vec3 shear{};                   // [Pa] G12 G13 G23
+  Vec3 axis_1 = {1, 0, 0};        // [-] unit
+  Vec3 axis_2 = {0, 1, 0};        // [-] unit, square to axis_1
+  std::optional<Axis> cylinder{}; // if given, axis 1 is radial and axis 2 tangential about it, at each element
 };
 
 /// Linear elasticity.
@@ -96,19 +113,71 @@ struct RigidBody
   double mass = 0;                 // [kg] at the reference point
   std::array<double, 6> inertia{}; // [kg m2] xx yy zz xy yz zx about the reference point
   Motions free{};                  // of the reference point; the other motions are fixed
+  Motions motions = every_motion;  // of the surfaces' nodes that follow; the others are the nodes' own
+};
+
+/// A point that moves with the weighted mean of nodes: a distributing coupling. What acts on it is shared by the nodes.
+struct Coupling
+{
+  std::string name;
+  std::vector<std::string> on;     // named groups
+  Vec3 at{};                       // [m] reference point
+  std::vector<double> weights;     // [-] of each node, one a group; empty: 1
+  double mass = 0;                 // [kg] at the reference point
+  std::array<double, 6> inertia{}; // [kg m2] as of a rigid body
 };
 
 /// The end of a spring that does not move.
 inline constexpr const char* ground = "ground";
 
-/// A spring and a dashpot in parallel, between two points or rigid bodies, or from one of them to the ground.
+/// A spring and a dashpot in parallel, between two points, bodies or groups, or from one of them to the ground. The
+/// nodes of a group have equal shares of it.
 struct Spring
 {
-  std::string from;        // point, rigid body or ground
+  std::string from;        // point, rigid body, coupling, group or ground
   std::string to = ground; // the same
   Vec3 direction{};        // [-] unit vector of the line of action
   double stiffness = 0;    // [N/m]
   double damping = 0;      // [N s/m]
+};
+
+/// What joins two bodies, or one to the ground, by the motion of `to` relative to `from`, both as rigid bodies taken to
+/// one place: locked motions are a joint, stiffness on the others a bushing.
+struct Connector
+{
+  std::string from;                // point, rigid body or coupling
+  std::string to = ground;         // the same, or ground
+  std::optional<Vec3> at{};        // [m] if absent, the middle between both; at `from` of one to the ground
+  Frame frame{};                   // of all below
+  Motions locked{};                // that are zero
+  std::vector<double> stiffness{}; // [N/m, N m] six of x y z rx ry rz, or 36 by rows; empty: none
+  std::vector<double> damping{};   // [N s/m, N m s] the same
+  double loss_factor = 0;          // [-] eta of the stiffness K (1 + i eta)
+};
+
+/// A straight beam between two points or bodies, whose nodes between them are its own.
+struct Beam
+{
+  std::string name;
+  std::string from, to;          // points, rigid bodies or couplings
+  double young = 0;              // [Pa]
+  double poisson = 0;            // [-]
+  double density = 0;            // [kg/m3]
+  double diameter = 0;           // [m] of a round section; 0: by the numbers below
+  double area = 0;               // [m2]
+  std::vector<double> bending{}; // [m4] second moments of area for bending along axes 2 and 3; one: both
+  double torsion = 0;            // [m4] torsion constant
+  double shear_factor = 0;       // [-] area of shear over area; 0: rigid in shear
+  Vec3 axis_2{};                 // [-] unit, across the beam; zero: any
+  int elements = 8;              // [-]
+  double loss_factor = 0;        // [-]
+};
+
+/// Mass that the nodes of a group share equally.
+struct AddedMass
+{
+  std::string on;  // named group
+  double mass = 0; // [kg]
 };
 
 /// A reduced structure of another code: its matrices on motions of retained nodes and on modal coordinates.
@@ -124,6 +193,9 @@ struct Support
 {
   std::string on; // named group or point; rows of a matrix scene (RowNames), also below
   Motions fixed{};
+  Frame frame{};       // of the motions
+  Vec3 displacement{}; // [m] that fixed x y z have
+  Vec3 rotation{};     // [rad] that fixed rx ry rz have
 };
 
 /// A force on a node, a body or a group.
@@ -131,6 +203,7 @@ struct Force
 {
   std::string on; // point, rigid body, or node group whose nodes share the force equally
   Vec3 vector{};  // [N] total force
+  Vec3 moment{};  // [N m] total moment, on nodes that rotate
 };
 
 /// A pressure on a surface.
@@ -138,6 +211,16 @@ struct Pressure
 {
   std::string on;   // named surface
   double value = 0; // [Pa] positive towards the solid
+};
+
+/// A bolt: a section through its shank, across which it is shortened until it has its tension. It keeps that length.
+struct Bolt
+{
+  std::string name;
+  std::string section; // named surface across the shank; empty: of a beam
+  std::string beam;    // its name
+  Vec3 axis{};         // [-] unit, of a section
+  double tension = 0;  // [N]
 };
 
 /// Coulomb's law with mu(s) = coefficient + (static_coefficient - coefficient) exp(-s/decay_speed) at the sliding speed
@@ -175,6 +258,7 @@ struct Contact
   SlaveSide slave{};                     // has one pair a node
   double compliance = 0;                 // [m3/N] approach over pressure, in series with the pairs; [m/N] of points
   std::optional<FrictionLaw> friction{}; // if absent, the scene's
+  std::filesystem::path gap_file{};      // of gaps by the places of slave nodes, that add to `gap`; empty: none
 };
 
 /// Whether nothing drives the rotor of a contact: its pairs stick or slip by what acts on them alone.

@@ -52,10 +52,11 @@ struct InitialMotion
 struct LoadStep
 {
   std::string name;
-  double load = 1;               // [-] on all forces and pressures
-  std::vector<double> forces;    // [-] beside it, one a force; empty: 1
-  std::vector<double> pressures; // [-] one a pressure; empty: 1
-  double friction = 1;           // [-] on the coefficients of driven contacts
+  double load = 1;                  // [-] on all forces and pressures
+  std::vector<double> forces;       // [-] beside it, one a force; empty: 1
+  std::vector<double> pressures;    // [-] one a pressure; empty: 1
+  double friction = 1;              // [-] on the coefficients of driven contacts
+  std::vector<std::string> bolts{}; // that have their tension at its end; the others keep their length
 };
 
 /// Where a transient starts.
@@ -275,11 +276,17 @@ struct Scene
   std::vector<Part> parts;
   std::vector<Point> points;
   std::vector<RigidBody> rigid_bodies;
+  std::vector<Coupling> couplings;
   std::vector<Spring> springs;
+  std::vector<Connector> connectors;
+  std::vector<Beam> beams;
+  std::vector<AddedMass> masses;
   std::vector<Superelement> superelements;
   std::vector<Support> supports;
   std::vector<Force> forces;
   std::vector<Pressure> pressures;
+  std::vector<Bolt> bolts;
+  Vec3 gravity{}; // [m/s2]
   std::vector<Contact> contacts;
   std::vector<LoadStep> steps; // to the scene's loads and friction, in order; empty: at once
   std::vector<InitialMotion> initial;

@@ -1,6 +1,6 @@
 #pragma once
-/// Free degrees of freedom q and constraints u = T q on nodal degrees of freedom u (src/README.md, sections 1.4, 1.6).
-/// Nodal degree of freedom 6 * node + c is component c of a node, c = 0..5 for x y z rx ry rz.
+/// Free degrees of freedom q and constraints u = T q + shift on nodal degrees of freedom u (src/README.md,
+/// sections 1.4, 1.6). Nodal degree of freedom 6 * node + c is component c of a node, c = 0..5 for x y z rx ry rz.
 #include "squeal/base/petsc.hpp"
 #include "squeal/mesh/contact_pairs.hpp"
 #include "squeal/mesh/row_motions.hpp"
@@ -50,6 +50,11 @@ struct DofMap
   std::vector<std::size_t> offsets; // of each nodal degree of freedom in `terms`, and the end
   std::vector<DofTerm> terms;
   DofNames names;
+  std::vector<double>
+      shift{}; // [m, rad] of each nodal degree of freedom beside T q: by supports, on rank 0; empty: none
+
+  /// What supports move a nodal degree of freedom by, whatever q is [m, rad].
+  double shift_of(PetscInt nodal_dof) const { return shift.empty() ? 0 : shift[static_cast<std::size_t>(nodal_dof)]; }
 
   /// Row of a nodal degree of freedom. It is empty where the motion is fixed or the node does not have it.
   std::span<const DofTerm> terms_of(PetscInt nodal_dof) const;

@@ -13,21 +13,35 @@ namespace squeal
 struct PathStep
 {
   std::string name;
-  Owned<Vec> load;            // [N, N m]
-  double driven_friction = 1; // [-] on the coefficients of driven pairs
+  Owned<Vec> load;                  // [N, N m]
+  double driven_friction = 1;       // [-] on the coefficients of driven pairs
+  std::vector<std::size_t> bolts{}; // of Structure::bolts, that have their tension at the end
+};
+
+/// A bolt as its shank's section sees it: its tension is stiffness * shortening - pull . q + own.
+struct TightBolt
+{
+  std::string name;
+  double tension = 0;    // [N] that it is tightened to
+  Owned<Vec> pull;       // [N/m] load on q by a unit of shortening
+  double stiffness = 0;  // [N/m] of what the section cuts
+  double own = 0;        // [N] by prescribed displacements alone
+  double shortening = 0; // [m] found by `tighten`; the load of the structure and of its path has its part
 };
 
 /// The matrices have one common non-zero pattern and are marked as symmetric.
 struct Structure
 {
-  Owned<Mat> M;                 // [kg, kg m, kg m2]
-  Owned<Mat> C;                 // [N s/m, N s, N m s]
-  Owned<Mat> K;                 // [N/m, N, N m]
-  Owned<Mat> G;                 // [N s/m] skew, gyroscopic; null: none
-  Owned<Mat> H;                 // [N/m] skew, circulatory; null: none
-  Owned<Mat> K_loss;            // [N/m] sum of eta K of the parts with a loss factor eta; null: none
-  double loss_omega = 0;        // [rad/s] C holds K_loss/loss_omega; 0: none of it
-  Owned<Vec> load;              // [N, N m]
+  Owned<Mat> M;          // [kg, kg m, kg m2]
+  Owned<Mat> C;          // [N s/m, N s, N m s]
+  Owned<Mat> K;          // [N/m, N, N m]
+  Owned<Mat> G;          // [N s/m] skew, gyroscopic; null: none
+  Owned<Mat> H;          // [N/m] skew, circulatory; null: none
+  Owned<Mat> K_loss;     // [N/m] sum of eta K of the parts with a loss factor eta; null: none
+  double loss_omega = 0; // [rad/s] C holds K_loss/loss_omega; 0: none of it
+  Owned<Vec> load;       // [N, N m] all of it
+  Owned<Vec> preload;    // [N, N m] of it, what no load factor scales: gravity, prescribed motions, bolts; null
+  std::vector<TightBolt> bolts{};
   std::vector<PathStep> path{}; // the way to it, which undriven pairs depend on; empty: in proportion, sliding
   std::int64_t elements = 0;    // number of elements; 0 on a matrix scene
   DofNames names;
@@ -39,6 +53,13 @@ Structure assemble(const MeshPiece& piece, const Scene& scene, MPI_Comm comm);
 
 /// Returns the load T' f of the scene's forces and pressures [N, N m]. Collective; rank 0 has the mesh and T whole.
 Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const DofMap& dofs, MPI_Comm comm);
+
+/// Sets the preload by gravity and by the motions that supports prescribe, T' (M a - K u_s), and the sections of the
+/// bolts, not yet tightened. Collective. Throws Error for a section that does not cut through.
+void assemble_preload(Structure& structure, const MeshPiece& piece, const Scene& scene, MPI_Comm comm);
+
+/// The tension of a bolt at u [N]. Collective.
+double tension_of(const TightBolt& bolt, Vec u);
 
 /// Returns the structure in the files M.petsc C.petsc K.petsc F.petsc of a folder, and of G.petsc and H.petsc where
 /// they are there. C and F are zero without their files. Without a B.petsc C and K may be unsymmetric: their skew

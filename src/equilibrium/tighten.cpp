@@ -1,0 +1,130 @@
+#include "squeal/equilibrium/tighten.hpp"
+
+#include "squeal/equilibrium/equilibrium.hpp"
+
+#include <cmath>
+#include <Eigen/Dense>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// The way to the end of a step of the path, with bolts of given shortenings there.
+class StepOfBolts
+{
+public:
+  StepOfBolts(Structure& structure, const Interface& interface, Equilibria& equilibria, std::size_t step)
+      : structure_(structure), interface_(interface), equilibria_(equilibria), step_(structure.path[step]),
+        loose_(copy_of(structure.path[step].load.get()))
+  {
+    for (const std::size_t bolt : step_.bolts)
+      check(VecAXPY(loose_, -structure.bolts[bolt].shortening, structure.bolts[bolt].pull));
+    to_here_.K = shared(structure.K.get());
+    to_here_.M = shared(structure.M.get());
+    to_here_.names = structure.names;
+    to_here_.load = copy_of(step_.load.get());
+    for (std::size_t i = 0; i < step; ++i)
+      to_here_.path.push_back(
+          {structure.path[i].name, shared(structure.path[i].load.get()), structure.path[i].driven_friction, {}});
+    to_here_.path.push_back({step_.name, shared(to_here_.load.get()), step_.driven_friction, {}});
+  }
+
+  const std::vector<std::size_t>& bolts() const { return step_.bolts; }
+
+  /// Sum of what the tension of each bolt lacks [N], at shortenings x.
+  VectorXd missing(const VectorXd& x)
+  {
+    check(VecCopy(loose_, to_here_.load));
+    for (Index i = 0; i < x.size(); ++i)
+    {
+      TightBolt& bolt = bolt_at(i);
+      bolt.shortening = x(i);
+      check(VecAXPY(to_here_.load, x(i), bolt.pull));
+    }
+    const Equilibrium found = equilibria_.at(to_here_, interface_);
+    if (found.outcome.kind != OutcomeKind::converged)
+      throw Error("bolt " + bolt_at(0).name + ": no equilibrium while it is tightened in step '" + step_.name +
+                  "': " + found.outcome.reason);
+    VectorXd result(x.size());
+    for (Index i = 0; i < x.size(); ++i) result(i) = bolt_at(i).tension - tension_of(bolt_at(i), found.u);
+    return result;
+  }
+
+  TightBolt& bolt_at(Index i) { return structure_.bolts[step_.bolts[static_cast<std::size_t>(i)]]; }
+
+private:
+  Structure& structure_;
+  const Interface& interface_;
+  Equilibria& equilibria_;
+  const PathStep& step_;
+  Owned<Vec> loose_;  // load at the end of the step without the bolts that it tightens
+  Structure to_here_; // as far as equilibria need it
+};
+
+/// Columns: by how much what is missing falls with each shortening [N/m].
+Eigen::MatrixXd slopes_at(StepOfBolts& step, const VectorXd& x, const VectorXd& missing)
+{
+  constexpr double part = 1e-2; // of the shortening: forces are linear while no pair changes its status
+  Eigen::MatrixXd slopes(x.size(), x.size());
+  for (Index i = 0; i < x.size(); ++i)
+  {
+    VectorXd beside = x;
+    beside(i) *= 1 + part;
+    slopes.col(i) = (missing - step.missing(beside)) / (beside(i) - x(i));
+  }
+  return slopes;
+}
+
+/// The shortenings at which nothing is missing.
+VectorXd shortenings(StepOfBolts& step)
+{
+  constexpr int most = 20;
+  constexpr double enough = 1e-11; // of the tension: what equilibria are found to
+  const auto count = static_cast<Index>(step.bolts().size());
+  VectorXd x(count), tension(count);
+  for (Index i = 0; i < count; ++i)
+  {
+    tension(i) = step.bolt_at(i).tension;
+    x(i) = tension(i) / step.bolt_at(i).stiffness; // if all but the section were rigid
+  }
+  VectorXd missing = step.missing(x);
+  for (int pass = 0; pass < most && (missing.array().abs() > enough * tension.array()).any(); ++pass)
+  {
+    x += slopes_at(step, x, missing).fullPivLu().solve(missing);
+    missing = step.missing(x);
+  }
+  constexpr double tolerable = 1e-9;
+  if ((missing.array().abs() > tolerable * tension.array()).any())
+    throw Error(format("bolt %s: its tension stays %g N from %g N: is its shank joined to what holds it?",
+                       step.bolt_at(0).name.c_str(), missing.cwiseAbs().maxCoeff(), tension(0)));
+  return x;
+}
+
+} // namespace
+
+void tighten(Structure& structure, const Interface& interface)
+{
+  if (structure.bolts.empty()) return;
+  Equilibria equilibria{EquilibriumOptions{}};
+  for (std::size_t step = 0; step < structure.path.size(); ++step)
+  {
+    if (structure.path[step].bolts.empty()) continue;
+    StepOfBolts here(structure, interface, equilibria, step);
+    std::vector<double> before;
+    for (const std::size_t bolt : here.bolts()) before.push_back(structure.bolts[bolt].shortening);
+    const VectorXd found = shortenings(here);
+    for (Index i = 0; i < found.size(); ++i)
+      for (std::size_t later = step; later < structure.path.size(); ++later)
+        check(
+            VecAXPY(structure.path[later].load, found(i) - before[static_cast<std::size_t>(i)], here.bolt_at(i).pull));
+    for (Index i = 0; i < found.size(); ++i)
+      check(VecAXPY(structure.preload, found(i) - before[static_cast<std::size_t>(i)], here.bolt_at(i).pull));
+  }
+}
+
+} // namespace squeal

@@ -1,0 +1,160 @@
+#include "bolts.hpp"
+
+#include "local_dofs.hpp"
+#include "squeal/base/error.hpp"
+#include "squeal/mesh/shapes.hpp"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Corners = std::array<int, 4>; // ascending; a triangle has -1 first
+
+/// Elements at the nodes of a section, and the faces that they share there.
+struct Around
+{
+  std::vector<int> elements;
+  std::map<Corners, std::vector<int>> faces; // elements of each face with a node of the section
+};
+
+bool is_on(const std::vector<int>& section, int node)
+{
+  return std::ranges::binary_search(section, node);
+}
+
+Around around(const Mesh& mesh, const std::vector<int>& section)
+{
+  Around result;
+  for (std::size_t i = 0; i < mesh.elements.size(); ++i)
+  {
+    const Element& element = mesh.elements[i];
+    if (!std::ranges::any_of(nodes_of(element), [&](int node) { return is_on(section, node); })) continue;
+    if (is_shell(element.shape)) continue;
+    result.elements.push_back(static_cast<int>(i));
+    for (const std::array<int, 4>& corners : corner_faces(element.shape))
+    {
+      Corners face;
+      for (std::size_t k = 0; k < 4; ++k) face[k] = corners[k] < 0 ? -1 : element.nodes[corners[k]];
+      std::ranges::sort(face);
+      if (std::ranges::any_of(face, [&](int node) { return node >= 0 && is_on(section, node); }))
+        result.faces[face].push_back(static_cast<int>(i));
+    }
+  }
+  return result;
+}
+
+double height(const Mesh& mesh, int element, const Vec3& axis)
+{
+  double sum = 0;
+  const auto nodes = nodes_of(mesh.elements[static_cast<std::size_t>(element)]);
+  for (const int node : nodes) sum += dot(mesh.nodes[static_cast<std::size_t>(node)], axis);
+  return sum / static_cast<double>(nodes.size());
+}
+
+/// The side of each element at the section, 1 where the axis points to. They spread from the section's faces through
+/// all others. Throws Error where they meet: one can walk round the section within the material.
+std::map<int, int> sides_of(const Mesh& mesh, const Bolt& bolt, const std::vector<int>& section)
+{
+  const auto fail = [&](const std::string& why)
+  {
+    throw Error("bolt " + bolt.name + ": the section '" + bolt.section + "' " + why +
+                ": name a surface across the whole shank, with elements of the shank on both sides");
+  };
+  const Around found = around(mesh, section);
+  std::map<int, int> side;
+  std::vector<int> open;
+  const auto set = [&](int element, int value)
+  {
+    const auto [place, is_new] = side.emplace(element, value);
+    if (is_new) open.push_back(element);
+    if (place->second != value) fail("does not cut the shank through: both of its sides are joined beside it");
+  };
+  const auto is_cut = [&](const Corners& face)
+  { return std::ranges::all_of(face, [&](int node) { return node < 0 || is_on(section, node); }); };
+  std::map<int, std::vector<int>> neighbours;
+  for (const auto& [face, elements] : found.faces)
+  {
+    if (elements.size() != 2) continue;
+    const auto [low, high] =
+        std::minmax(elements[0], elements[1],
+                    [&](int a, int b) { return height(mesh, a, bolt.axis) < height(mesh, b, bolt.axis); });
+    if (is_cut(face))
+    {
+      set(low, -1);
+      set(high, 1);
+      continue;
+    }
+    neighbours[low].push_back(high);
+    neighbours[high].push_back(low);
+  }
+  if (side.empty()) fail("has no face between two solid elements");
+  while (!open.empty())
+  {
+    const int element = open.back();
+    open.pop_back();
+    for (const int other : neighbours[element]) set(other, side.at(element));
+  }
+  if (side.size() < found.elements.size()) fail("has nodes of other solids");
+  return side;
+}
+
+/// Throws Error for nodes that a contact or tie reads too: it would see one side of the section.
+void check_free(const Mesh& mesh, const Scene& scene, const Bolt& bolt, const std::vector<int>& section)
+{
+  const auto look = [&](const std::string& name, const std::string& user)
+  {
+    const auto group = mesh.node_groups.find(name);
+    if (group == mesh.node_groups.end()) return;
+    for (const int node : group->second)
+      if (is_on(section, node))
+        throw Error("bolt " + bolt.name + ": " + node_text(node, mesh.nodes[static_cast<std::size_t>(node)]) +
+                    " of its section is in the " + user + " of '" + name + "' too: cut the shank elsewhere");
+  };
+  for (const Contact& contact : scene.contacts)
+    for (const std::string& name : {contact.rotor, contact.stator}) look(name, "contact");
+  for (const Tie& tie : scene.ties)
+    for (const std::string& name : {tie.slave, tie.master}) look(name, "tie");
+}
+
+std::vector<Cut> cuts_of_section(const Bolt& bolt, const MeshPiece& piece, const Scene& scene)
+{
+  const std::vector<int> section = named_nodes(piece.mesh, bolt.section, "bolt " + bolt.name);
+  check_free(piece.mesh, scene, bolt, section);
+  std::vector<Cut> cuts;
+  for (const auto& [element, side] : sides_of(piece.mesh, bolt, section))
+  {
+    if (side < 0) continue;
+    Cut cut{element_contribution(piece, scene, static_cast<std::size_t>(element)), {}};
+    cut.shift.setZero(static_cast<Eigen::Index>(cut.of.nodal_dofs.size()));
+    for (Eigen::Index k = 0; k < cut.shift.size(); ++k)
+      if (const PetscInt nodal_dof = cut.of.nodal_dofs[static_cast<std::size_t>(k)];
+          is_on(section, static_cast<int>(nodal_dof / 6)))
+        cut.shift(k) = -bolt.axis[static_cast<std::size_t>(nodal_dof % 6)];
+    cuts.push_back(std::move(cut));
+  }
+  return cuts;
+}
+
+} // namespace
+
+std::vector<Cut> cuts_of(const Bolt& bolt, const MeshPiece& piece, const Scene& scene)
+{
+  if (bolt.beam.empty()) return cuts_of_section(bolt, piece, scene);
+  const auto beam = std::ranges::find(scene.beams, bolt.beam, &Beam::name);
+  const auto index = static_cast<std::size_t>(beam - scene.beams.begin());
+  const Mesh& mesh = piece.mesh;
+  const std::vector<int>& nodes = mesh.beams[index];
+  const Vec3 span = mesh.nodes[static_cast<std::size_t>(nodes[1])] - mesh.nodes[static_cast<std::size_t>(nodes[0])];
+  std::vector<Contribution> own = beam_contributions(mesh, scene, index);
+  Cut cut{std::move(own.front()), Eigen::VectorXd::Zero(12)};
+  for (Eigen::Index c = 0; c < 3; ++c) cut.shift(c) = -span[static_cast<std::size_t>(c)] / norm(span);
+  return {cut};
+}
+
+} // namespace squeal

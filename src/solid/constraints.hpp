@@ -1,0 +1,74 @@
+#pragma once
+/// Linear constraints on the nodal degrees of freedom, before the free ones are numbered.
+#include "squeal/solid/dofs.hpp"
+
+#include <Eigen/Core>
+#include <unordered_map>
+
+namespace squeal
+{
+
+enum class DofKind : char
+{
+  absent, // the node has no such component
+  free,
+  fixed,
+  dependent, // a linear combination of others
+};
+
+struct ConstraintTerm
+{
+  PetscInt nodal_dof = 0;
+  double factor = 0; // [-, m, 1/m]
+};
+
+struct Constraints
+{
+  std::vector<DofKind> kind; // of each nodal degree of freedom
+  std::unordered_map<PetscInt, std::vector<ConstraintTerm>> dependent;
+  std::unordered_map<PetscInt, double> shift; // [m, rad] that a fixed or dependent one has beside its terms; else none
+  std::unordered_map<int, int> body_of;       // rigid body of a node on its surfaces
+
+  DofKind& kind_of(int node, int component) { return kind[6 * PetscInt{node} + component]; }
+};
+
+/// Factors of free nodal degrees of freedom, and what is added to them.
+struct FreeSum
+{
+  std::map<PetscInt, double> factors{};
+  double constant = 0;
+};
+
+/// Adds factor * u(nodal_dof), by the free ones that it depends on. A dependent degree of freedom may depend on
+/// another, as the rotation of a joint on the solid nodes of a rigid body, but never on itself.
+void add_expanded(const Constraints& constraints, PetscInt nodal_dof, double factor, FreeSum& sum);
+
+void make_dependent(Constraints& constraints, PetscInt nodal_dof, std::vector<ConstraintTerm> terms);
+
+/// Rows of the relative motion of `to` against `from`, both taken to one place as rigid bodies: 6 x 12 on the motions
+/// of both, or 6 x 6 on those of `from` against the ground.
+Eigen::MatrixXd relative_motion(const Vec3& at, const std::vector<Vec3>& ends);
+
+/// The nodes that a connector joins, one or two, and the place at which it reads their motion.
+struct Joined
+{
+  std::vector<int> nodes;
+  Vec3 at{};
+};
+
+Joined joined_by(const Connector& connector, const Mesh& mesh);
+
+/// The motions of couplings by those of their nodes:
+///     theta = I^-1 sum w_i r_i x u_i,   u = sum w_i u_i/sum w_i + theta x (at - c),
+/// with r_i from the weighted centroid c and I = sum w_i (|r_i|^2 1 - r_i r_i'). Throws Error for nodes on a line.
+void add_couplings(Constraints& constraints, const Mesh& mesh, const std::vector<Coupling>& couplings);
+
+/// The motions that supports hold in frames of their own or move, and those that connectors lock. Each row is solved
+/// for the free motion of its largest factor; one that the others imply is left out. Throws Error for one that
+/// contradicts them.
+void add_rows(Constraints& constraints, const Mesh& mesh, const Scene& scene);
+
+/// Whether a support holds motions along the axes of the scene, without moving them.
+bool is_plain(const Support& support);
+
+} // namespace squeal

@@ -1,0 +1,220 @@
+#include "contributions.hpp"
+
+#include "beam_kernel.hpp"
+#include "constraints.hpp"
+#include "local_dofs.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/base/constants.hpp"
+#include "squeal/mesh/frames.hpp"
+#include "squeal/mesh/shapes.hpp"
+#include "squeal/solid/binary.hpp"
+#include "squeal/solid/element.hpp"
+#include "squeal/solid/structure.hpp"
+
+#include <algorithm>
+#include <Eigen/Dense>
+
+namespace squeal
+{
+
+namespace
+{
+
+/// `inertia` is xx yy zz xy yz zx [kg m2].
+Contribution mass_contribution(int node, double mass, const std::array<double, 6>& inertia)
+{
+  const auto& [xx, yy, zz, xy, yz, zx] = inertia;
+  Contribution result{nodal_dofs_of(std::span(&node, 1), 6), Eigen::MatrixXd::Zero(6, 6), Eigen::MatrixXd::Zero(6, 6),
+                      Eigen::MatrixXd::Zero(6, 6)};
+  result.M.diagonal().head<3>().setConstant(mass);
+  result.M.bottomRightCorner<3, 3>() << xx, xy, zx, xy, yy, yz, zx, yz, zz;
+  return result;
+}
+
+/// Adds the mass of a reference point.
+void add_mass(const Mesh& mesh, const std::string& name, double mass, const std::array<double, 6>& inertia,
+              std::vector<Contribution>& result)
+{
+  result.push_back(mass_contribution(point_node(mesh, name, "mass"), mass, inertia));
+}
+
+/// The elongation d . (u_to - u_from) of a spring gives K = k s s', with s the elongations of unit displacements. The
+/// ground does not move; a group has a spring at each of its nodes, of an equal share.
+void add_spring(const Mesh& mesh, const Spring& spring, std::vector<Contribution>& result)
+{
+  const std::string user = "spring from " + spring.from + " to " + spring.to;
+  const auto nodes_at = [&](const std::string& name)
+  { return name == ground ? std::vector<int>{-1} : named_nodes(mesh, name, user); };
+  const std::vector<int> from = nodes_at(spring.from), to = nodes_at(spring.to);
+  if (std::min(from.size(), to.size()) > 1)
+    throw Error(user + ": both ends are groups, whose nodes have no order: let a [[coupling]] follow one of them, and "
+                       "name that");
+  const std::size_t count = std::max(from.size(), to.size());
+  const Eigen::Vector3d direction(spring.direction.data());
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    std::vector<int> nodes;
+    Eigen::VectorXd s;
+    for (const auto& [node, sign] :
+         {std::pair{from[std::min(i, from.size() - 1)], -1.}, std::pair{to[std::min(i, to.size() - 1)], 1.}})
+    {
+      if (node < 0) continue;
+      nodes.push_back(node);
+      s.conservativeResize(s.size() + 3);
+      s.tail<3>() = sign * direction;
+    }
+    const Eigen::MatrixXd square = 1. / static_cast<double>(count) * s * s.transpose();
+    result.push_back({nodal_dofs_of(nodes, 3), 0 * square, spring.damping * square, spring.stiffness * square});
+  }
+}
+
+void add_shared_mass(const Mesh& mesh, const AddedMass& added, std::vector<Contribution>& result)
+{
+  const std::vector<int> nodes = named_nodes(mesh, added.on, "mass");
+  const Eigen::Matrix3d share = added.mass / static_cast<double>(nodes.size()) * Eigen::Matrix3d::Identity();
+  for (const int node : nodes) result.push_back({nodal_dofs_of(std::span(&node, 1), 3), share, 0 * share, 0 * share});
+}
+
+/// Six numbers are a diagonal, 36 a matrix.
+Eigen::MatrixXd six_by_six(const std::vector<double>& values)
+{
+  if (values.size() == 36) return Eigen::MatrixXd::Map(values.data(), 6, 6);
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(6, 6);
+  if (values.size() == 6) result.diagonal() = Eigen::VectorXd::Map(values.data(), 6);
+  return result;
+}
+
+/// G' R S R' G, with G the relative motion of both ends taken to one place: a rigid motion of both does no work.
+Contribution connector_contribution(const Mesh& mesh, const Connector& connector, double omega)
+{
+  const Joined joined = joined_by(connector, mesh);
+  std::vector<Vec3> ends;
+  for (const int node : joined.nodes) ends.push_back(mesh.nodes[node]);
+  const std::string user = "connector from " + connector.from + " to " + connector.to;
+  const Eigen::MatrixXd strain =
+      twice(axes_at(connector.frame, joined.at, user)).transpose() * relative_motion(joined.at, ends);
+  const Eigen::MatrixXd K = strain.transpose() * six_by_six(connector.stiffness) * strain;
+  Eigen::MatrixXd C = strain.transpose() * six_by_six(connector.damping) * strain;
+  if (connector.loss_factor > 0) C += connector.loss_factor / omega * K;
+  return {nodal_dofs_of(joined.nodes, 6), 0 * K, C, K, connector.loss_factor};
+}
+
+/// Returns a small matrix in a file, whole. Throws Error unless it is symmetric and of this order.
+Eigen::MatrixXd small_matrix(const std::filesystem::path& file, Eigen::Index order)
+{
+  const MatrixSize size = check_matrix_file(file, PETSC_COMM_SELF);
+  if (size.rows != order || size.columns != order)
+    throw Error(file.string() + ": " + std::to_string(size.rows) + " x " + std::to_string(size.columns) +
+                ", but dofs.txt beside it has " + std::to_string(order) + " lines");
+  const Eigen::MatrixXd A = dense_copy(load_matrix(file, size, size, PETSC_COMM_SELF));
+  constexpr double rounding = 1e-9; // of exported matrices
+  if ((A - A.transpose()).cwiseAbs().maxCoeff() > rounding * A.cwiseAbs().maxCoeff())
+    throw Error(file.string() + ": not symmetric");
+  return A;
+}
+
+Contribution superelement_contribution(const std::vector<SuperelementRow>& rows, const std::filesystem::path& folder,
+                                       const RayleighDamping& damping)
+{
+  for (const char* other : {"F.petsc", "G.petsc", "H.petsc"})
+    if (is_file(folder / other))
+      throw Error((folder / other).string() + ": a superelement has M, K and C alone: remove the file, and put forces "
+                                              "into [[force]] by node");
+  Contribution added;
+  for (const SuperelementRow& row : rows) added.nodal_dofs.push_back(6 * PetscInt{row.node} + row.motion);
+  const auto order = static_cast<Eigen::Index>(added.nodal_dofs.size());
+  added.M = small_matrix(folder / "M.petsc", order);
+  added.K = small_matrix(folder / "K.petsc", order);
+  if (is_file(folder / "C.petsc"))
+    added.C = small_matrix(folder / "C.petsc", order);
+  else
+    added.C = damping.alpha * added.M + damping.beta * added.K;
+  return added;
+}
+
+/// The material of a part at an element with nodes at x: the axes of an orthotropic one may turn.
+Material material_at(const Part& part, const std::vector<Vec3>& x)
+{
+  Material material = part.material;
+  if (!material.orthotropy || !material.orthotropy->cylinder) return material;
+  Orthotropy& o = *material.orthotropy;
+  Vec3 middle{};
+  for (const Vec3& node : x) middle = middle + 1. / static_cast<double>(x.size()) * node;
+  const Eigen::Matrix3d axes = axes_at({o.axis_1, o.axis_2, o.cylinder}, middle, "part " + part.name);
+  for (Eigen::Index c = 0; c < 3; ++c)
+  {
+    o.axis_1[static_cast<std::size_t>(c)] = axes(c, 0);
+    o.axis_2[static_cast<std::size_t>(c)] = axes(c, 1);
+  }
+  return material;
+}
+
+} // namespace
+
+double loss_omega(const Scene& scene)
+{
+  return two_pi * scene.damping.loss_frequency;
+}
+
+Contribution element_contribution(const MeshPiece& piece, const Scene& scene, std::size_t index)
+{
+  const Element& element = piece.mesh.elements[index];
+  const Part& part = scene.parts[element.part];
+  const std::vector<Vec3> x = positions_of(piece.mesh, element);
+  try
+  {
+    ElementMatrices matrices = element_matrices(element.shape, x, material_at(part, x), part.thickness);
+    const RayleighDamping damping = part.damping.value_or(scene.damping);
+    Eigen::MatrixXd C = damping.alpha * matrices.mass + damping.beta * matrices.stiffness;
+    if (part.loss_factor > 0) C += part.loss_factor / loss_omega(scene) * matrices.stiffness;
+    return {nodal_dofs_of(element), std::move(matrices.mass), std::move(C), std::move(matrices.stiffness),
+            part.loss_factor};
+  }
+  catch (const std::runtime_error& error)
+  {
+    const bool whole = piece.element_numbers.empty();
+    const int number = whole ? static_cast<int>(index) : piece.element_numbers[index], node = element.nodes[0];
+    throw Error("part " + part.name + ", element " + std::to_string(number) + " with " +
+                node_text(whole ? node : piece.node_numbers[static_cast<std::size_t>(node)], x[0]) + ": " +
+                error.what());
+  }
+}
+
+std::vector<Contribution> beam_contributions(const Mesh& mesh, const Scene& scene, std::size_t index)
+{
+  std::vector<Contribution> result;
+  const Beam& beam = scene.beams[index];
+  const BeamSection section = section_of(beam);
+  for (std::size_t i = 1; i < mesh.beams[index].size(); ++i)
+  {
+    const std::array nodes = {mesh.beams[index][i - 1], mesh.beams[index][i]};
+    ElementMatrices matrices = beam_matrices(mesh.nodes[nodes[0]], mesh.nodes[nodes[1]], beam.axis_2, section);
+    Eigen::MatrixXd C = scene.damping.alpha * matrices.mass + scene.damping.beta * matrices.stiffness;
+    if (beam.loss_factor > 0) C += beam.loss_factor / loss_omega(scene) * matrices.stiffness;
+    result.push_back({nodal_dofs_of(nodes, 6), std::move(matrices.mass), std::move(C), std::move(matrices.stiffness),
+                      beam.loss_factor});
+  }
+  return result;
+}
+
+std::vector<Contribution> lumped_contributions(const Mesh& mesh, const Scene& scene)
+{
+  std::vector<Contribution> result;
+  for (const Point& point : scene.points) add_mass(mesh, point.name, point.mass, {}, result);
+  for (const RigidBody& body : scene.rigid_bodies) add_mass(mesh, body.name, body.mass, body.inertia, result);
+  for (const Coupling& coupling : scene.couplings)
+    if (coupling.mass > 0 || coupling.inertia != std::array<double, 6>{}) // else it would join all nodes in vain
+      add_mass(mesh, coupling.name, coupling.mass, coupling.inertia, result);
+  for (const AddedMass& added : scene.masses) add_shared_mass(mesh, added, result);
+  for (const Spring& spring : scene.springs) add_spring(mesh, spring, result);
+  for (const Connector& connector : scene.connectors)
+    if (!connector.stiffness.empty() || !connector.damping.empty())
+      result.push_back(connector_contribution(mesh, connector, loss_omega(scene)));
+  for (std::size_t i = 0; i < mesh.superelements.size(); ++i)
+    result.push_back(superelement_contribution(mesh.superelements[i], scene.superelements[i].folder, scene.damping));
+  for (std::size_t i = 0; i < mesh.beams.size(); ++i)
+    for (Contribution& of : beam_contributions(mesh, scene, i)) result.push_back(std::move(of));
+  return result;
+}
+
+} // namespace squeal
