@@ -52,11 +52,10 @@ public:
   long periods() const { return steps_ / steps_per_period_; }
   const State& now(std::size_t k) const { return states_[k]; }
 
-  /// To the end of the period at hand.
-  void integrate_period()
+  void integrate_to(long periods)
   {
     const MPI_Comm comm = comm_of(problem_.sliding.structure.load);
-    for (const long end = (periods() + 1) * steps_per_period_; steps_ < end;)
+    while (steps_ < periods * steps_per_period_)
     {
       ++steps_;
       const std::vector<StepReport> reports =
@@ -64,11 +63,6 @@ public:
       for (std::size_t k = 0; k < states_.size(); ++k) watch(reports[k], k);
       end_if_asked(comm);
     }
-  }
-
-  void integrate_to(long periods)
-  {
-    while (this->periods() < periods) integrate_period();
   }
 
   std::vector<ReachedMotion> reached() const
@@ -167,19 +161,17 @@ Attractors find_attractors(const AttractorProblem& problem)
 {
   Attractors found;
   const int steps = problem.settings.steps_per_period;
-  found.outcome.reason = friction_refusal(problem.sliding, &problem.unstable.modes.front(), problem.settings.theta,
-                                          1 / (problem.unstable.modes.front().frequency_hz() * steps), problem.step, 1);
-  if (!found.outcome.reason.empty())
-  {
-    found.outcome.kind = OutcomeKind::refused;
-    return found;
-  }
+  const std::string refusal =
+      friction_refusal(problem.sliding, &problem.unstable.modes.front(), problem.settings.theta,
+                       1 / (problem.unstable.modes.front().frequency_hz() * steps), problem.step, 1);
+  if (!refusal.empty()) return {{OutcomeKind::refused, refusal, 0, 0}, {}, {}, 0};
   std::vector<State> states;
   for (NamedStart& start : make_starts(problem))
   {
     found.starts.push_back(start.name);
     states.push_back(std::move(start.state));
   }
+  if (states.empty()) return {{OutcomeKind::skipped, "no amplitude is known that contact limits", 0, 0}, {}, {}, 0};
   Swarm swarm(problem, steps, std::move(states));
   Progress progress(comm_of(problem.sliding.structure.load), "attractors", static_cast<double>(most_periods));
   std::vector<ReachedMotion> motions;

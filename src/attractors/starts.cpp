@@ -55,15 +55,6 @@ State random_start(const AttractorProblem& problem, std::mt19937_64& generator)
   return start;
 }
 
-/// The mode that grows fastest, below all that limits it: smaller motions come through the same states.
-void add_small_start(const AttractorProblem& problem, std::vector<NamedStart>& starts)
-{
-  constexpr double below = 0.5; // of the first event
-  const auto& [modes, estimates] = problem.unstable;
-  if (const double event = first_event(estimates.front()); event > 0 && std::isfinite(event))
-    starts.push_back({"growth of mode 1", mode_state(problem.sliding.equilibrium, modes.front(), below * event, 0)});
-}
-
 } // namespace
 
 std::vector<NamedStart> make_starts(const AttractorProblem& problem)
@@ -90,7 +81,9 @@ std::vector<NamedStart> make_starts(const AttractorProblem& problem)
   std::mt19937_64 generator(1); // equal runs draw equal starts
   for (int number = 1; starts.size() < wanted; ++number)
     starts.push_back({format("random %d", number), random_start(problem, generator)});
-  if (problem.from_small) add_small_start(problem, starts);
+  const double event = first_event(problem.unstable.estimates.front());
+  if (problem.from_small && event > 0 && std::isfinite(event)) // smaller motions come through its state
+    starts.push_back({"growth of mode 1", mode_state(equilibrium, problem.unstable.modes.front(), event / 2, 0)});
   return starts;
 }
 

@@ -249,32 +249,24 @@ std::optional<BranchEvent> fold_among(BranchCorrector& corrector, const std::arr
   const double least = 1e-6 * corrector.scales.parameter;
   if (std::min(std::abs(parameter(1) - parameter(0)), std::abs(parameter(2) - parameter(1))) < least) return {};
   if (!((parameter(1) - parameter(0)) * (parameter(2) - parameter(1)) < 0)) return {};
-  constexpr int by_parabola = 2, at_corner = 8;
-  std::array<ExaminedOrbit, at_corner> found;
-  double change = 0.5 * std::abs(parameter(2) - parameter(0));
-  for (int pass = 0; pass < at_corner; ++pass)
+  std::array<ExaminedOrbit, 2> found;
+  BranchEvent event = event_at(BranchEventKind::fold, *points[1], 0.5 * std::abs(parameter(2) - parameter(0)));
+  for (ExaminedOrbit& fold : found)
   {
-    const bool corner = pass >= by_parabola;
-    if (corner && alike(*now[0], *now[1]) && alike(*now[1], *now[2])) break;
     const double before = distance(corrector, *now[0], *now[1]), after = distance(corrector, *now[1], *now[2]);
-    const double at = corner ? 0.5 * (after > before ? after : -before)
-                             : vertex({-before, 0, after}, {parameter(0), parameter(1), parameter(2)});
+    const double at = vertex({-before, 0, after}, {parameter(0), parameter(1), parameter(2)});
     const std::size_t side = at < 0 ? 0 : 1;
     const double part = std::clamp(at < 0 ? 1 + at / before : at / after, 0., 1.);
     std::optional<CorrectedOrbit> corrected = correct_between(corrector, *now[side], *now[side + 1], part);
     if (!corrected) break;
-    ExaminedOrbit& fold = found[static_cast<std::size_t>(pass)];
     fold = examine(corrector, std::move(*corrected), Examined::measures_alone);
-    const double beyond = (fold.corrected.parameter - parameter(1)) * (parameter(1) - parameter(0));
-    change = std::abs(fold.corrected.parameter - parameter(1));
-    if (corner && beyond < 0)
-      now[side == 0 ? 0 : 2] = &fold;
-    else
-      now = side == 0 ? std::array{now[0], static_cast<const ExaminedOrbit*>(&fold), now[1]}
-                      : std::array{now[1], static_cast<const ExaminedOrbit*>(&fold), now[2]};
+    event = event_at(BranchEventKind::fold, fold, std::abs(fold.corrected.parameter - event.parameter));
+    now = side == 0 ? std::array{now[0], static_cast<const ExaminedOrbit*>(&fold), now[1]}
+                    : std::array{now[1], static_cast<const ExaminedOrbit*>(&fold), now[2]};
   }
-  if (!alike(*now[0], *now[1]) || !alike(*now[1], *now[2])) change = std::max(change, rise_to_corner(corrector, now));
-  return event_at(BranchEventKind::fold, *now[1], change);
+  if (!alike(*now[0], *now[1]) || !alike(*now[1], *now[2]))
+    event.error = std::max(event.error, rise_to_corner(corrector, now));
+  return event;
 }
 
 } // namespace squeal

@@ -20,7 +20,7 @@ namespace squeal
 namespace
 {
 
-constexpr long most_splits = 100; // of the status iteration
+constexpr int most_splits = 100; // of the status iteration
 
 /// Of every pair: normal r_n + kappa (g - g0), tangential mu r_n e.
 std::vector<double> pair_forces(const Interface& interface, const std::vector<double>& reaction,
@@ -101,21 +101,6 @@ std::vector<char> first_split(const ComplementarityProblem& problem, const Inter
   for (std::size_t i = 0; i < closed.size(); ++i)
     closed[i] = problem.N.size() > 0 || interface.gap[i] <= 0 || problem.q[i] < 0;
   return closed;
-}
-
-/// The status iteration, and Lemke's path where friction makes it repeat itself.
-StatusSolution find_split(const ComplementarityProblem& problem, const Interface& interface,
-                          const std::vector<char>& expected)
-{
-  if (expected.size() == problem.q.size())
-    if (StatusSolution near = solve_by_status(problem, expected, most_splits); near.outcome == StatusOutcome::converged)
-      return near;
-  const std::vector<char> first = first_split(problem, interface);
-  StatusSolution solution = solve_by_status(problem, first, most_splits);
-  if (solution.outcome == StatusOutcome::converged) return solution;
-  StatusSolution again = solve_by_pivoting(problem, first);
-  again.iterations += solution.iterations;
-  return again;
 }
 
 /// sign c r added to the gaps: of a pair with a compliance c the law holds for g + c r.
@@ -312,23 +297,24 @@ Equilibrium find_with(Equilibria::Kept& kept, const Structure& structure, const 
   if (pairs > 0)
   {
     const auto& [D_nn, D_nt] = kept.D;
-    on_rank_zero_with_lent_cores(comm, pairs,
-                                 [&]
-                                 {
-                                   const std::vector<double> mu = drive_friction(interface),
-                                                             sense = senses(interface, kept.axes);
-                                   Eigen::VectorXd friction(D_nn.rows()), c(D_nn.rows());
-                                   for (Eigen::Index i = 0; i < c.size(); ++i)
-                                   {
-                                     const auto pair = static_cast<std::size_t>(i);
-                                     friction(i) = mu[pair] * sense[pair];
-                                     c(i) = compliance_of(interface, pair);
-                                   }
-                                   search.problem =
-                                       problem_of(D_nn, D_nn + D_nt * friction.asDiagonal(), held.kappa, q, c);
-                                   search.own = D_nn.diagonal() + c;
-                                   search.solution = find_split(search.problem, interface, expected);
-                                 });
+    on_rank_zero_with_lent_cores(
+        comm, pairs,
+        [&]
+        {
+          const std::vector<double> mu = drive_friction(interface), sense = senses(interface, kept.axes);
+          Eigen::VectorXd friction(D_nn.rows()), c(D_nn.rows());
+          for (Eigen::Index i = 0; i < c.size(); ++i)
+          {
+            const auto pair = static_cast<std::size_t>(i);
+            friction(i) = mu[pair] * sense[pair];
+            c(i) = compliance_of(interface, pair);
+          }
+          search.problem = problem_of(D_nn, D_nn + D_nt * friction.asDiagonal(), held.kappa, q, c);
+          search.own = D_nn.diagonal() + c;
+          const bool near = expected.size() == pairs;
+          search.solution =
+              solve_by_status(search.problem, near ? expected : first_split(search.problem, interface), most_splits);
+        });
     share(search.solution, pairs, comm);
   }
 

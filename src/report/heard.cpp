@@ -90,21 +90,26 @@ std::string energy_text(const MeanValue& energy)
   return format(", mean energy %.*g +- %.0e J", digits, energy.value, energy.error);
 }
 
-/// A cycle that starts lead to in place of the settled motion; empty: none was seen.
-std::string steady_starts_text(const Report& report)
+/// A motion that starts lead to and that is not the answer, the one that most of them lead to; empty: there is none.
+template <class IsOther> std::string starts_beside(const Report& report, const char* to, const IsOther& is_other)
 {
   const Attractors& attractors = report.attractors;
-  const SettledMotion& settled = report.motion.settled;
   if (!has_run(attractors.outcome)) return {};
+  const auto other = std::ranges::find_if(attractors.motions, is_other); // those that most starts lead to come first
+  if (other == attractors.motions.end()) return {};
+  return format(", but %zu of %zu starts lead to a %s at %.5g Hz, mean energy %.3g J", other->starts.size(),
+                attractors.starts.size(), to, other->frequency.value, other->energy.value);
+}
+
+/// A cycle that starts lead to in place of the settled motion.
+std::string steady_starts_text(const Report& report)
+{
+  const SettledMotion& settled = report.motion.settled;
   const MeanValue energy{settled.fluctuating_energy.value, settled.fluctuating_energy.error + settled.step_error},
       frequency{settled.examined.base.first, 0};
-  const auto other =
-      std::ranges::find_if(attractors.motions, // those that most starts lead to come first
-                           [&](const ReachedMotion& motion)
-                           { return motion.kind == ReachedKind::steady && !is_cycle(motion, energy, frequency); });
-  if (other == attractors.motions.end()) return {};
-  return format("; %zu of %zu other starts lead to a cycle at %.5g Hz, mean energy %.3g J", other->starts.size(),
-                attractors.starts.size(), other->frequency.value, other->energy.value);
+  return starts_beside(report, "cycle",
+                       [&](const ReachedMotion& motion)
+                       { return motion.kind == ReachedKind::steady && !is_cycle(motion, energy, frequency); });
 }
 
 std::string settled_text(const Report& report, const Scene& scene)
@@ -201,15 +206,9 @@ std::string cycle_sentence(const Report& report, const Scene& scene)
 /// The motion that most of the starts lead to beside a stable equilibrium; empty: all that have settled come to rest.
 std::string beside_rest(const Report& report)
 {
-  const Attractors& attractors = report.attractors;
-  if (!has_run(attractors.outcome)) return {};
-  const auto goes_on =
-      std::ranges::find_if(attractors.motions, // those that most starts lead to come first
-                           [](const ReachedMotion& motion)
-                           { return motion.kind == ReachedKind::steady || motion.kind == ReachedKind::varying; });
-  if (goes_on == attractors.motions.end()) return {};
-  return format(", but %zu of %zu starts lead to a motion at %.5g Hz", goes_on->starts.size(), attractors.starts.size(),
-                goes_on->frequency.value);
+  return starts_beside(report, "motion",
+                       [](const ReachedMotion& motion)
+                       { return motion.kind == ReachedKind::steady || motion.kind == ReachedKind::varying; });
 }
 
 /// Without a cycle.

@@ -170,11 +170,6 @@ bool whole_is_affordable(const Flow& flow, PetscInt dofs)
   return grids * (products + eigenproblem) <= affordable_work;
 }
 
-bool is_decided(const FloquetAnalysis& found)
-{
-  return found.multipliers.stability != Stability::undecided;
-}
-
 } // namespace
 
 std::size_t deciding_place(const Multipliers& multipliers)
@@ -224,6 +219,8 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
     projected = multipliers_by_projection(monodromy, options.multipliers, refusal);
   // where periods are dear, a search that decides takes longer than the cycle
   const bool tries_another = options.multiplier_method == MultiplierMethod::automatic && !dear;
+  const auto is_decided = [](const FloquetAnalysis& found)
+  { return found.multipliers.stability != Stability::undecided; };
   if (projected && (!tries_another || is_decided(*projected))) return std::move(*projected);
   FloquetAnalysis result =
       multipliers_by_search(monodromy, motions_that_may_grow(problem, orbit, other_unstable), columns);

@@ -99,7 +99,7 @@ def test_friction_that_falls_within_a_step_is_no_motion_of_starts(squeal, tmp_pa
 def test_starts_beside_a_stable_equilibrium_are_large_enough_for_stick_slip(squeal, tmp_path):
     """Any displacement above 1.1 V/omega leads to stick-slip at 16.50094 Hz, by events."""
     scene = block_on_belt(tmp_path, 0.538, 6957.0, 5.946, 10.0, 0.05, {"coefficient": 0.2, "static_coefficient": 0.6, "decay_speed": 2e-3},
-                          modes={"band": 100.0}, cycle={"starts": 8, "steps_per_period": 512})
+                          modes={"band": 100.0}, cycle={"starts": 8, "steps_per_period": 256})
     found = squeal(scene, ranks=1).report["attractors"]
     steady = [motion for motion in found["motions"] if motion["kind"] == "steady"]
     assert found["outcome"] == "completed" and len(steady) == 1 and len(steady[0]["starts"]) >= 4

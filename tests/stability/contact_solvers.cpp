@@ -194,7 +194,7 @@ TEST_CASE("one equilibrium is promised only where there is one")
     {
       std::vector<char> closed(n);
       for (std::size_t i = 0; i < n; ++i) closed[i] = (bits >> i) & 1;
-      const SplitSolution split = solve_split(problem, closed, problem.q);
+      const SplitSolution split = SplitSolver(problem, closed).solve(problem.q);
       const double least = std::min(*std::min_element(split.gap.begin(), split.gap.end()),
                                     *std::min_element(split.reaction.begin(), split.reaction.end()));
       solutions += least >= 0 && split.defect < 1e-9 ? 1 : 0;

@@ -4,9 +4,8 @@
 /// N is the identity, unless the structure is held by contact only (equilibrium/equilibrium.hpp says how it arises).
 ///
 /// Status iteration: with the pairs split into closed (g = 0) and open (r = 0) the problem is linear; every pair whose
-/// sign is wrong changes status. When that stops reducing their number, only the last one does. This block principal
-/// pivoting (Judice and Pires 1994) is finite when M is a P-matrix, which too much friction prevents. Beyond, a split
-/// met twice ends it, and Lemke's path goes on. Arithmetic of one rank.
+/// sign is wrong changes status (block principal pivoting, Judice and Pires 1994). When that stops reducing their
+/// number, Lemke's path takes over. Arithmetic of one rank.
 #include <Eigen/LU>
 #include <memory>
 #include <optional>
@@ -46,37 +45,29 @@ private:
   std::optional<Eigen::PartialPivLU<Eigen::Ref<Eigen::MatrixXd>>> factors_; // none if a pivot is lost in rounding
 };
 
-/// Of one right-hand side. Error: an entry is not finite.
-SplitSolution solve_split(const ComplementarityProblem& problem, const std::vector<char>& closed,
-                          const std::vector<double>& rhs);
-
-/// How the status iteration ended.
+/// How the search for a split ended.
 enum class StatusOutcome
 {
   converged,
-  singular,      // a split whose signs fit does not balance
   impossible,    // there is no solution
-  not_converged, // a split was met twice, or the iterations allowed did not do
+  not_converged, // none was found, and nothing proves that there is none
 };
 
-/// The split that the status iteration ended with, one entry a pair.
+/// The split that the search ended with, one entry a pair.
 struct StatusSolution
 {
   StatusOutcome outcome = StatusOutcome::not_converged;
   int iterations = 0;
   std::vector<char> closed;
-  std::vector<double> gap, reaction;   // [m, N]; empty unless converged or singular
-  std::unique_ptr<SplitSolver> solver; // of this split; null unless converged or singular
+  std::vector<double> gap, reaction;   // [m, N]; empty unless converged
+  std::unique_ptr<SplitSolver> solver; // of this split; null unless converged
 };
 
-/// Solves by status iteration from the split `closed`, in at most `max_iterations` splits. The outcome says how it
-/// ended; the solver borrows the problem. Error: an entry is not finite.
-StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, long max_iterations);
-
-/// Solves by Lemke's path from the split `closed`, and by trying all splits of up to 12 pairs. "Impossible" is proved:
-/// no split fits, or no reactions at all keep every gap from being negative. The solver borrows the problem. Error: an
-/// entry is not finite.
-StatusSolution solve_by_pivoting(const ComplementarityProblem& problem, const std::vector<char>& closed);
+/// Solves by status iteration from the split `first`, in at most `max_iterations` splits, then by Lemke's path from it
+/// and by trying all splits of up to 12 pairs. "Impossible" is proved: no split fits, or no reactions at all keep every
+/// gap from being negative. The solver borrows the problem. Error: an entry is not finite.
+StatusSolution solve_by_status(const ComplementarityProblem& problem, const std::vector<char>& first,
+                               int max_iterations);
 
 /// Whether the symmetric part of M is positive definite, N being the identity: then there is one solution and no other.
 bool has_one_solution(const ComplementarityProblem& problem);
