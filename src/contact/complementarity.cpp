@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Dense>
-#include <set>
 
 namespace squeal
 {
@@ -93,12 +92,6 @@ SplitSolution SplitSolver::solve(const std::vector<double>& rhs) const
   return solution;
 }
 
-SplitSolution solve_split(const ComplementarityProblem& problem, const std::vector<char>& closed,
-                          const std::vector<double>& rhs)
-{
-  return SplitSolver(problem, closed).solve(rhs);
-}
-
 namespace
 {
 
@@ -114,43 +107,189 @@ std::vector<std::size_t> wrong_pairs(const SplitSolution& split, double complian
   return wrong;
 }
 
+/// The problem seen from a split: x are the gaps and scaled reactions that it leaves open, y those that it sets to
+/// zero, and z is added to all of x:
+///     x = b + P y + z,   x, y >= 0,   x_i y_i = 0.
+/// An exchange makes a variable of the right side one of the left. Variables are numbered x, y, z.
+class Dictionary
+{
+public:
+  /// A little compliance on every pair makes P finite where pairs share a rigid face.
+  Dictionary(const ComplementarityProblem& problem, const std::vector<char>& closed)
+      : pairs_(static_cast<Index>(closed.size())), closed_(closed)
+  {
+    constexpr double softness = 1e-10; // of the compliance
+    MatrixXd gaps = problem.N.size() == 0 ? MatrixXd::Identity(pairs_, pairs_) : problem.N;
+    MatrixXd reactions = problem.M / -problem.compliance;
+    reactions.diagonal().array() -= softness;
+    for (Index i = 0; i < pairs_; ++i)
+      if (is_closed(i)) gaps.col(i).swap(reactions.col(i));
+    const Eigen::PartialPivLU<MatrixXd> unknown(gaps);
+    table_.resize(pairs_, pairs_ + 2);
+    table_.leftCols(pairs_) = -unknown.solve(reactions);
+    table_.col(pairs_).setOnes();
+    table_.col(pairs_ + 1) = unknown.solve(VectorXd::Map(problem.q.data(), pairs_));
+    for (Index i = 0; i < pairs_; ++i)
+    {
+      left_.push_back(i);
+      right_.push_back(pairs_ + i);
+    }
+    right_.push_back(z());
+  }
+
+  bool is_finite() const { return table_.allFinite(); }
+
+  /// Lemke's method (Cottle, Pang and Stone 1992, section 4.4): z falls along a path on which one pair at a time is
+  /// neither open nor closed. Whether it came to zero.
+  bool follow_path()
+  {
+    Index row = 0;
+    if (constants().minCoeff(&row) >= 0) return true;
+    Index entering = exchange(row, pairs_);
+    for (Index left = most_exchanges(); entering != z() && left > 0; --left)
+    {
+      const auto column = std::ranges::find(right_, (entering + pairs_) % (2 * pairs_)) - right_.begin();
+      row = leaving_row(column);
+      if (row < 0) return false;
+      entering = exchange(row, column);
+    }
+    return entering == z();
+  }
+
+  /// Whether x, y >= 0 keep z above zero even where x_i y_i need not be zero: then there is no solution. From the end
+  /// of a path.
+  bool is_impossible()
+  {
+    constexpr double surely = 1e-7; // of the largest constant
+    for (Index left = most_exchanges(); left > 0; --left)
+    {
+      const Index of_z = std::ranges::find(left_, z()) - left_.begin();
+      if (of_z == pairs_) return false;
+      Index column = 0;
+      if (table_.row(of_z).head(pairs_ + 1).minCoeff(&column) >= -rounding)
+        return constants()[of_z] > surely * constants().cwiseAbs().maxCoeff();
+      const Index row = leaving_row(column);
+      if (row < 0) return false;
+      exchange(row, column);
+    }
+    return false;
+  }
+
+  std::vector<char> split() const
+  {
+    std::vector<char> closed = closed_;
+    for (const Index variable : right_)
+      if (variable < pairs_) closed[static_cast<std::size_t>(variable)] = !closed[static_cast<std::size_t>(variable)];
+    return closed;
+  }
+
+private:
+  static constexpr double rounding = 1e-11; // of entries, which are ratios of compliances
+
+  Index z() const { return 2 * pairs_; }
+  Index most_exchanges() const { return 20 * pairs_ + 100; }
+  bool is_closed(Index pair) const { return closed_[static_cast<std::size_t>(pair)]; }
+  MatrixXd::ColXpr constants() { return table_.col(pairs_ + 1); }
+
+  /// The row whose variable is the first to fall to zero as a column's rises, z before others; -1: none falls.
+  Index leaving_row(Index column)
+  {
+    Index best = -1;
+    double least = 0;
+    for (Index i = 0; i < pairs_; ++i)
+    {
+      const double slope = table_(i, column);
+      if (slope >= -rounding) continue;
+      const double until = constants()[i] / -slope;
+      const bool is_z = left_[static_cast<std::size_t>(i)] == z();
+      if (best >= 0 && (is_z ? until > least + rounding * least : until >= least)) continue;
+      best = i;
+      least = until;
+    }
+    return best;
+  }
+
+  /// Solves the row for the column's variable and returns the one that went right.
+  Index exchange(Index row, Index column)
+  {
+    const double pivot = table_(row, column);
+    table_.row(row) /= -pivot;
+    table_(row, column) = 1 / pivot;
+    const VectorXd entering = table_.col(column);
+    const Eigen::RowVectorXd solved = table_.row(row);
+    for (Index j = 0; j < table_.cols(); ++j)
+      if (j != column) table_.col(j) += solved[j] * entering;
+    table_.col(column) = entering / pivot;
+    table_.row(row) = solved;
+    std::swap(left_[static_cast<std::size_t>(row)], right_[static_cast<std::size_t>(column)]);
+    return right_[static_cast<std::size_t>(column)];
+  }
+
+  Index pairs_;
+  std::vector<char> closed_; // of the split
+  MatrixXd table_;           // P, the ones of z, b
+  std::vector<Index> left_, right_;
+};
+
+/// The solution of a split; nothing where a sign is wrong or the split does not balance. `wrong`: pairs of wrong sign.
+std::optional<StatusSolution> solution_of(const ComplementarityProblem& problem, const std::vector<char>& closed,
+                                          std::vector<std::size_t>& wrong)
+{
+  auto solver = std::make_unique<SplitSolver>(problem, closed);
+  SplitSolution split = solver->solve(problem.q);
+  wrong = wrong_pairs(split, problem.compliance);
+  if (!wrong.empty() || split.defect > defect_tolerance) return std::nullopt;
+  for (double& value : split.gap) value = std::max(0., value);
+  for (double& value : split.reaction) value = std::max(0., value);
+  return StatusSolution{StatusOutcome::converged, 1, closed, std::move(split.gap), std::move(split.reaction),
+                        std::move(solver)};
+}
+
+/// By Lemke's path from a split, and by trying every split of few pairs.
+StatusSolution solve_by_pivoting(const ComplementarityProblem& problem, std::vector<char> closed)
+{
+  constexpr std::size_t few = 12; // pairs: 4096 splits, which take less than the path of a thousand pairs
+  const std::size_t pairs = closed.size();
+  std::vector<std::size_t> wrong;
+  Dictionary dictionary(problem, closed);
+  const bool finite = dictionary.is_finite();
+  if (finite && dictionary.follow_path())
+    if (auto found = solution_of(problem, dictionary.split(), wrong)) return std::move(*found);
+  for (std::size_t set = 0; pairs <= few && set < (std::size_t{1} << pairs); ++set)
+  {
+    for (std::size_t i = 0; i < pairs; ++i) closed[i] = (set >> i) & 1;
+    if (auto found = solution_of(problem, closed, wrong)) return std::move(*found);
+  }
+  StatusSolution none;
+  if (pairs <= few || (finite && dictionary.is_impossible())) none.outcome = StatusOutcome::impossible;
+  none.closed = std::move(closed);
+  return none;
+}
+
 } // namespace
 
-StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, long max_iterations)
+StatusSolution solve_by_status(const ComplementarityProblem& problem, const std::vector<char>& first,
+                               int max_iterations)
 {
-  constexpr int patience = 10;
-  StatusSolution result;
+  std::vector<char> closed = first;
   std::size_t fewest = problem.q.size() + 1;
-  int tries = patience;
-  std::set<std::vector<char>> met; // while pairs change one at a time
-  for (result.iterations = 1; result.iterations <= max_iterations; ++result.iterations)
+  constexpr int patience = 10;
+  int iterations = 1;
+  for (int tries = patience; iterations <= max_iterations && tries >= 0; ++iterations)
   {
-    auto solver = std::make_unique<SplitSolver>(problem, closed);
-    SplitSolution split = solver->solve(problem.q);
-    std::vector<std::size_t> wrong = wrong_pairs(split, problem.compliance);
-    if (wrong.empty())
+    std::vector<std::size_t> wrong;
+    if (auto found = solution_of(problem, closed, wrong))
     {
-      result.outcome = split.defect <= defect_tolerance ? StatusOutcome::converged : StatusOutcome::singular;
-      result.gap = std::move(split.gap);
-      result.reaction = std::move(split.reaction);
-      for (double& value : result.gap) value = std::max(0., value);
-      for (double& value : result.reaction) value = std::max(0., value);
-      result.closed = std::move(closed);
-      result.solver = std::move(solver);
-      return result;
+      found->iterations = iterations;
+      return std::move(*found);
     }
+    if (wrong.empty()) break; // it does not balance
     tries = wrong.size() < fewest ? patience : tries - 1;
     fewest = std::min(fewest, wrong.size());
-    if (tries == patience) met.clear();
-    if (tries < 0)
-    {
-      if (!met.insert(closed).second) break;
-      wrong = {wrong.back()};
-    }
     for (const std::size_t i : wrong) closed[i] = !closed[i];
   }
-  result.outcome = result.iterations <= max_iterations ? StatusOutcome::cycles : StatusOutcome::not_converged;
-  result.closed = std::move(closed);
+  StatusSolution result = solve_by_pivoting(problem, first);
+  result.iterations += iterations;
   return result;
 }
 
@@ -172,44 +311,6 @@ double unilateral_residual(const std::vector<double>& reaction, const std::vecto
     otherwise = std::max(otherwise, rho[i] * std::abs(pull[i]));
   }
   return error == 0 ? 0 : error / (scale > 0 ? scale : otherwise);
-}
-
-ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
-                                       long max_iterations)
-{
-  const std::size_t n = problem.q.size();
-  const std::vector<double> scale(n, 1 / problem.compliance);
-  ProjectionSolution result;
-  result.reaction.assign(n, 0.);
-  std::vector<double> g(n);
-  double best = HUGE_VAL;
-  for (;; ++result.iterations)
-  {
-    VectorXd::Map(g.data(), static_cast<Index>(n)) = as_vector(problem.q) + problem.M * as_vector(result.reaction);
-    result.residual = unilateral_residual(result.reaction, g, scale, problem.q);
-    best = std::min(best, result.residual);
-    if (result.residual <= tolerance || !std::isfinite(result.residual) || result.iterations >= max_iterations)
-      return result;
-    if (result.iterations % 50 == 49 && result.residual > 10 * best) rho /= 2;
-    for (std::size_t i = 0; i < n; ++i) result.reaction[i] = std::max(0., result.reaction[i] - rho * g[i]);
-  }
-}
-
-double largest_eigenvalue(const MatrixXd& A, const VectorXd& added, int iterations)
-{
-  VectorXd x(A.rows()), image(A.rows());
-  for (Index i = 0; i < x.size(); ++i) x[i] = 1 + 0.5 * std::sin(7. * static_cast<double>(i) + 1);
-  double eigenvalue = 0;
-  for (int iteration = 0; iteration < iterations; ++iteration)
-  {
-    if (x.norm() == 0) return 0;
-    x.normalize();
-    image.noalias() = A.selfadjointView<Eigen::Lower>() * x;
-    image += added.cwiseProduct(x);
-    eigenvalue = image.norm();
-    x.swap(image);
-  }
-  return eigenvalue;
 }
 
 } // namespace squeal

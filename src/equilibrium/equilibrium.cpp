@@ -20,7 +20,7 @@ namespace squeal
 namespace
 {
 
-constexpr long most_splits = 100; // of the status iteration
+constexpr int most_splits = 100; // of the status iteration
 
 /// Of every pair: normal r_n + kappa (g - g0), tangential mu r_n e.
 std::vector<double> pair_forces(const Interface& interface, const std::vector<double>& reaction,
@@ -103,24 +103,6 @@ std::vector<char> first_split(const ComplementarityProblem& problem, const Inter
   return closed;
 }
 
-/// The status iteration, with a second chance from the fixed point's set where friction makes it cycle.
-StatusSolution find_split(const ComplementarityProblem& problem, const Interface& interface, double rho,
-                          const std::vector<char>& expected)
-{
-  if (expected.size() == problem.q.size())
-    if (StatusSolution near = solve_by_status(problem, expected, most_splits); near.outcome == StatusOutcome::converged)
-      return near;
-  StatusSolution solution = solve_by_status(problem, first_split(problem, interface), most_splits);
-  if (solution.outcome == StatusOutcome::converged || problem.N.size() > 0) return solution;
-  const auto projected = solve_by_projection(problem, rho, 1e-8, 5000);
-  if (projected.residual > 1e-8) return solution;
-  std::vector<char> closed(problem.q.size());
-  std::transform(projected.reaction.begin(), projected.reaction.end(), closed.begin(), [](double r) { return r > 0; });
-  StatusSolution again = solve_by_status(problem, std::move(closed), most_splits);
-  again.iterations += solution.iterations;
-  return again;
-}
-
 /// sign c r added to the gaps: of a pair with a compliance c the law holds for g + c r.
 std::vector<double> add_compliance(const Interface& interface, double sign, const std::vector<double>& reaction,
                                    std::vector<double> gap)
@@ -135,7 +117,6 @@ struct Search
   Eigen::VectorXd own; // diagonal of D_nn with the compliance of the pairs
   ComplementarityProblem problem;
   StatusSolution solution;
-  double rho = 0; // 1/lambda_max(D_nn)
 };
 
 /// u, and gaps and reactions corrected by what u's own gaps say: the rounding of D drops out. Each pass refines u, too.
@@ -177,7 +158,7 @@ Checks check_reactions(const Search& search, const std::vector<double>& gap)
   const std::vector<double>& reaction = search.solution.reaction;
   const std::size_t pairs = gap.size();
   Checks checks;
-  std::vector<double> rho(pairs, search.rho);
+  std::vector<double> rho(pairs, 1 / search.problem.compliance);
   for (std::size_t i = 0; i < pairs; ++i)
     if (const double own = search.own(static_cast<Eigen::Index>(i)); own > 0) rho[i] = 1 / own;
   checks.residual = unilateral_residual(reaction, gap, rho, gap);
@@ -209,16 +190,16 @@ Outcome failure(const StatusSolution& solution, const Interface& interface)
 {
   const std::vector<double> mu = drive_friction(interface);
   const double friction = mu.empty() ? 0 : *std::max_element(mu.begin(), mu.end());
-  Outcome outcome{OutcomeKind::no_equilibrium, "", solution.iterations, 1};
-  if (solution.outcome == StatusOutcome::cycles)
-    outcome.reason = format("the sets of closed pairs repeat without end at mu = %g: friction is too large", friction);
-  else if (solution.outcome == StatusOutcome::singular)
-    outcome.reason = format(
-        "no set of closed pairs balances the load at mu = %g: the structure tips, slides away or lifts off", friction);
-  else
-    outcome = {OutcomeKind::not_converged, format("no fitting set of closed pairs among %ld", most_splits),
-               solution.iterations, 1};
-  return outcome;
+  if (solution.outcome == StatusOutcome::impossible)
+    return {OutcomeKind::no_equilibrium,
+            format("no set of closed pairs balances the load at mu = %g: friction is too large, or the structure tips, "
+                   "slides away or lifts off",
+                   friction),
+            solution.iterations, 1};
+  return {
+      OutcomeKind::not_converged,
+      format("no fitting set of closed pairs was found at mu = %g, and nothing proves that there is none", friction),
+      solution.iterations, 1};
 }
 
 void share(StatusSolution& solution, std::size_t pairs, MPI_Comm comm)
@@ -316,24 +297,24 @@ Equilibrium find_with(Equilibria::Kept& kept, const Structure& structure, const 
   if (pairs > 0)
   {
     const auto& [D_nn, D_nt] = kept.D;
-    on_rank_zero_with_lent_cores(comm, pairs,
-                                 [&]
-                                 {
-                                   const std::vector<double> mu = drive_friction(interface),
-                                                             sense = senses(interface, kept.axes);
-                                   Eigen::VectorXd friction(D_nn.rows()), c(D_nn.rows());
-                                   for (Eigen::Index i = 0; i < c.size(); ++i)
-                                   {
-                                     const auto pair = static_cast<std::size_t>(i);
-                                     friction(i) = mu[pair] * sense[pair];
-                                     c(i) = compliance_of(interface, pair);
-                                   }
-                                   search.problem =
-                                       problem_of(D_nn, D_nn + D_nt * friction.asDiagonal(), held.kappa, q, c);
-                                   search.own = D_nn.diagonal() + c;
-                                   search.rho = 1 / largest_eigenvalue(D_nn, c, 30);
-                                   search.solution = find_split(search.problem, interface, 1.5 * search.rho, expected);
-                                 });
+    on_rank_zero_with_lent_cores(
+        comm, pairs,
+        [&]
+        {
+          const std::vector<double> mu = drive_friction(interface), sense = senses(interface, kept.axes);
+          Eigen::VectorXd friction(D_nn.rows()), c(D_nn.rows());
+          for (Eigen::Index i = 0; i < c.size(); ++i)
+          {
+            const auto pair = static_cast<std::size_t>(i);
+            friction(i) = mu[pair] * sense[pair];
+            c(i) = compliance_of(interface, pair);
+          }
+          search.problem = problem_of(D_nn, D_nn + D_nt * friction.asDiagonal(), held.kappa, q, c);
+          search.own = D_nn.diagonal() + c;
+          const bool near = expected.size() == pairs;
+          search.solution =
+              solve_by_status(search.problem, near ? expected : first_split(search.problem, interface), most_splits);
+        });
     share(search.solution, pairs, comm);
   }
 

@@ -176,17 +176,6 @@ TEST_CASE("the fixed point contracts for 0 < rho lambda_max(W) < 2 at a rate set
   CHECK(fixed_point_iterations(200, 0.5) / tenfold == doctest::Approx(2).epsilon(0.05));
 }
 
-TEST_CASE("at rest the same bound holds, on one pair exactly")
-{
-  ComplementarityProblem problem;
-  problem.M.setConstant(1, 1, 2);
-  problem.q = {-1};
-  problem.compliance = 2;
-  CHECK(solve_by_projection(problem, 1.95 / 2, 1e-10, 40).residual > 1e-10); // 0.95^n: slow beside the bound
-  CHECK(solve_by_projection(problem, 1.95 / 2, 1e-10, 1000).residual <= 1e-10);
-  CHECK(solve_by_projection(problem, 1 / 2., 1e-10, 2).residual <= 1e-10); // one step is exact
-}
-
 TEST_CASE("one equilibrium is promised only where there is one")
 {
   std::mt19937 random(21);
@@ -205,7 +194,7 @@ TEST_CASE("one equilibrium is promised only where there is one")
     {
       std::vector<char> closed(n);
       for (std::size_t i = 0; i < n; ++i) closed[i] = (bits >> i) & 1;
-      const SplitSolution split = solve_split(problem, closed, problem.q);
+      const SplitSolution split = SplitSolver(problem, closed).solve(problem.q);
       const double least = std::min(*std::min_element(split.gap.begin(), split.gap.end()),
                                     *std::min_element(split.reaction.begin(), split.reaction.end()));
       solutions += least >= 0 && split.defect < 1e-9 ? 1 : 0;

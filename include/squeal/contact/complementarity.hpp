@@ -4,9 +4,8 @@
 /// N is the identity, unless the structure is held by contact only (equilibrium/equilibrium.hpp says how it arises).
 ///
 /// Status iteration: with the pairs split into closed (g = 0) and open (r = 0) the problem is linear; every pair whose
-/// sign is wrong changes status. When that stops reducing their number, only the last one does. This block principal
-/// pivoting (Judice and Pires 1994) is finite when M is a P-matrix, which too much friction prevents. Beyond, a split
-/// met twice ends it. Arithmetic of one rank.
+/// sign is wrong changes status (block principal pivoting, Judice and Pires 1994). When that stops reducing their
+/// number, Lemke's path takes over. Arithmetic of one rank.
 #include <Eigen/LU>
 #include <memory>
 #include <optional>
@@ -46,32 +45,29 @@ private:
   std::optional<Eigen::PartialPivLU<Eigen::Ref<Eigen::MatrixXd>>> factors_; // none if a pivot is lost in rounding
 };
 
-/// Of one right-hand side. Error: an entry is not finite.
-SplitSolution solve_split(const ComplementarityProblem& problem, const std::vector<char>& closed,
-                          const std::vector<double>& rhs);
-
-/// How the status iteration ended.
+/// How the search for a split ended.
 enum class StatusOutcome
 {
   converged,
-  cycles,        // a split was met twice
-  singular,      // a split whose signs fit does not balance
-  not_converged, // within the iterations allowed
+  impossible,    // there is no solution
+  not_converged, // none was found, and nothing proves that there is none
 };
 
-/// The split that the status iteration ended with, one entry a pair.
+/// The split that the search ended with, one entry a pair.
 struct StatusSolution
 {
   StatusOutcome outcome = StatusOutcome::not_converged;
   int iterations = 0;
   std::vector<char> closed;
-  std::vector<double> gap, reaction;   // [m, N]; empty unless converged or singular
-  std::unique_ptr<SplitSolver> solver; // of this split; null unless converged or singular
+  std::vector<double> gap, reaction;   // [m, N]; empty unless converged
+  std::unique_ptr<SplitSolver> solver; // of this split; null unless converged
 };
 
-/// Solves by status iteration from the split `closed`, in at most `max_iterations` splits. The outcome says how it
-/// ended; the solver borrows the problem. Error: an entry is not finite.
-StatusSolution solve_by_status(const ComplementarityProblem& problem, std::vector<char> closed, long max_iterations);
+/// Solves by status iteration from the split `first`, in at most `max_iterations` splits, then by Lemke's path from it
+/// and by trying all splits of up to 12 pairs. "Impossible" is proved: no split fits, or no reactions at all keep every
+/// gap from being negative. The solver borrows the problem. Error: an entry is not finite.
+StatusSolution solve_by_status(const ComplementarityProblem& problem, const std::vector<char>& first,
+                               int max_iterations);
 
 /// Whether the symmetric part of M is positive definite, N being the identity: then there is one solution and no other.
 bool has_one_solution(const ComplementarityProblem& problem);
@@ -80,21 +76,5 @@ bool has_one_solution(const ComplementarityProblem& problem);
 /// where no pair has a reaction.
 double unilateral_residual(const std::vector<double>& reaction, const std::vector<double>& gap,
                            const std::vector<double>& rho, const std::vector<double>& pull);
-
-/// The end of the projection iteration.
-struct ProjectionSolution
-{
-  int iterations = 0;
-  double residual = 0; // the unilateral residual with rho = 1/compliance, its pull q
-  std::vector<double> reaction;
-};
-
-/// Iterates r <- max(0, r - rho g), g = q + M r, from r = 0; N must be the identity. `rho` [N/m] is halved when the
-/// residual grows. `tolerance`: of the residual. Ends before it is met where `is_over` says so.
-ProjectionSolution solve_by_projection(const ComplementarityProblem& problem, double rho, double tolerance,
-                                       long max_iterations);
-
-/// Largest eigenvalue of a symmetric positive semi-definite A with a diagonal added, by power iteration: a lower bound.
-double largest_eigenvalue(const Eigen::MatrixXd& A, const Eigen::VectorXd& added, int iterations);
 
 } // namespace squeal

@@ -44,7 +44,7 @@ struct LoadHistory
   std::vector<ContactStatus> statuses{}; // of all pairs
 };
 
-/// outcome: "converged", "no equilibrium" (the status sets cycle, or no set balances the load: mu is too large),
+/// outcome: "converged", "no equilibrium" (no set of closed pairs balances the load, which is proved: mu is too large),
 /// "not converged". u and the reactions are zero without an equilibrium.
 /// residual: the largest natural map of a pair, |r_n - max(0, r_n - g/D_nn)|, over the largest reaction.
 struct Equilibrium
