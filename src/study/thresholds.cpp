@@ -66,7 +66,8 @@ std::vector<Group> groups_between(const Followed& a, const Followed& b, const st
     if (!taken[j] && in_band(b.modes.pairs[j], band)) others.to.push_back(j);
   std::vector<Group> groups;
   for (auto& [first, group] : clusters)
-    if (std::ranges::any_of(group.from, [&](std::size_t i) { return in_band(a.modes.pairs[i], band); }))
+    if (std::ranges::any_of(group.from, [&](std::size_t i) { return in_band(a.modes.pairs[i], band); }) ||
+        std::ranges::any_of(group.to, [&](std::size_t j) { return in_band(b.modes.pairs[j], band); }))
       groups.push_back(std::move(group));
   groups.push_back(std::move(others));
   return groups;
@@ -113,6 +114,7 @@ public:
       std::vector<Followed> points = points_between(a, b, *changing);
       if (!points.empty())
       {
+        const std::size_t known = found_.size();
         const Followed* last = &a;
         for (Followed& point : points)
         {
@@ -120,6 +122,8 @@ public:
           last = &point;
         }
         look_between(*last, b, search_.follow(*last, b));
+        // a mode that changes beyond the band changes in none of the parts: the whole of them holds its threshold
+        if (found_.size() == known && !ended_) record(a, b, *changing);
         return;
       }
     }
