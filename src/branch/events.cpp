@@ -167,6 +167,23 @@ double distance(const BranchCorrector& corrector, const ExaminedOrbit& from, con
   return std::sqrt(scaled_product(corrector, step, step));
 }
 
+/// Whether contact does the same on both orbits, so that a parabola may hold between them.
+bool alike(const ExaminedOrbit& a, const ExaminedOrbit& b)
+{
+  return moves(a.measures) == moves(b.measures) && (a.measures.stick_steps > 0) == (b.measures.stick_steps > 0);
+}
+
+/// How far beyond the middle one of three orbits the parameter may turn, where either side bends towards its turn: the
+/// line of each side goes on to the other one's end.
+double rise_to_corner(const BranchCorrector& corrector, const std::array<const ExaminedOrbit*, 3>& orbits)
+{
+  const double before = distance(corrector, *orbits[0], *orbits[1]),
+               after = distance(corrector, *orbits[1], *orbits[2]);
+  const double of_first = std::abs(orbits[1]->corrected.parameter - orbits[0]->corrected.parameter),
+               of_second = std::abs(orbits[2]->corrected.parameter - orbits[1]->corrected.parameter);
+  return std::max(of_first / before * after, of_second / after * before);
+}
+
 } // namespace
 
 ExaminedOrbit examine(BranchCorrector& corrector, CorrectedOrbit corrected, Examined wanted)
@@ -247,6 +264,8 @@ std::optional<BranchEvent> fold_among(BranchCorrector& corrector, const std::arr
     now = side == 0 ? std::array{now[0], static_cast<const ExaminedOrbit*>(&fold), now[1]}
                     : std::array{now[1], static_cast<const ExaminedOrbit*>(&fold), now[2]};
   }
+  if (!alike(*now[0], *now[1]) || !alike(*now[1], *now[2]))
+    event.error = std::max(event.error, rise_to_corner(corrector, now));
   return event;
 }
 
