@@ -11,14 +11,14 @@ from models import write_block_on_plate
 SLOWER = 1.2720196495  # square root of the golden ratio: no common period within any number of turns that matters
 
 
-def two_oscillators(folder, damping=1.0):
+def two_oscillators(folder, damping=1.0, slower=SLOWER):
     """inputs/oscillator beside its own copy, slowed; the copy's dashpots `damping` times as strong."""
     text = (INPUTS / "oscillator" / "scene.toml").read_text()
     one = text[text.index("[[point]]"):text.index("[friction]")]
-    scaled = {"mass": SLOWER**2, "damping": SLOWER * damping}
+    scaled = {"mass": slower**2, "damping": slower * damping}
     two = re.sub(r"(mass|damping) = ([\d.]+)", lambda m: f"{m[1]} = {float(m[2]) * scaled[m[1]]!r}", one)
     two = two.replace('"pad"', '"pad2"').replace('"disc"', '"disc2"')
-    two = two.replace("velocity = [0.6, 0, 0]", f"velocity = [{0.6 / SLOWER!r}, 0, 0]")
+    two = two.replace("velocity = [0.6, 0, 0]", f"velocity = [{0.6 / slower!r}, 0, 0]")
     scene = folder / "scene.toml"
     scene.write_text(text.replace(one, one + two))
     return [scene, "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=100"]
@@ -42,6 +42,14 @@ def test_a_torus_is_what_the_motion_settles_on(squeal, tmp_path, ranks):
     assert third["mean"] < -third["error"]
     # the mean of each oscillator's own fluctuating energy, the slower one's being the same
     assert "no cycle attracts that was found: quasi-periodic" in run.printed and report["heard"] in run.printed
+
+
+def test_a_phase_between_equal_neighbours_is_neither_stable_nor_unstable(squeal, tmp_path):
+    """Two equal oscillators that do not touch: nothing changes their phase difference, whose multiplier is exactly 1. The grid
+    of time moves it, as it moves a shift in time."""
+    report = squeal(*two_oscillators(tmp_path, slower=1.0), ranks=1).report
+    assert report["modes"]["unstable_count"] == 2
+    assert report["cycle"]["multipliers"]["stability"] == "undecided" and "stable" not in report["heard"].split("undecided")[0]
 
 
 def test_beside_a_neighbour_that_is_stable_the_cycle_is_found(squeal, tmp_path):
