@@ -159,6 +159,17 @@ MultiplierMethod chosen_method(const ShootingOptions& options, PetscInt dofs)
                                                                                         : MultiplierMethod::oblique;
 }
 
+/// Whether the whole matrix of a system that is not small is affordable: its columns on three grids of time, and as
+/// many eigenproblems, whose operations count a quarter of an entry read.
+bool whole_is_affordable(const Flow& flow, PetscInt dofs)
+{
+  constexpr double grids = 3, operations = 10; // of a dense eigenproblem, over the cube of its size
+  const double columns = 2. * dofs;
+  const double products = columns * flow.work / columns_per_period,
+               eigenproblem = operations / 4 * std::pow(columns, 3);
+  return grids * (products + eigenproblem) <= affordable_work;
+}
+
 } // namespace
 
 std::size_t deciding_place(const Multipliers& multipliers)
@@ -208,16 +219,22 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
     projected = multipliers_by_projection(monodromy, options.multipliers, refusal);
   // where periods are dear, a search that decides takes longer than the cycle
   const bool tries_another = options.multiplier_method == MultiplierMethod::automatic && !dear;
-  if (projected &&
-      (!tries_another || projected->multipliers.complete || projected->multipliers.stability != Stability::undecided))
-    return std::move(*projected);
+  const auto is_decided = [](const FloquetAnalysis& found)
+  { return found.multipliers.stability != Stability::undecided; };
+  if (projected && (!tries_another || is_decided(*projected))) return std::move(*projected);
   FloquetAnalysis result =
       multipliers_by_search(monodromy, motions_that_may_grow(problem, orbit, other_unstable), columns);
-  if (projected)
+  if (projected) result.multipliers.periods += projected->multipliers.periods;
+  if (tries_another && !is_decided(result) && whole_is_affordable(problem.flow, dofs))
   {
-    const long periods = projected->multipliers.periods + result.multipliers.periods;
-    projected->multipliers.periods = result.multipliers.periods = periods;
-    if (result.multipliers.stability == Stability::undecided) return std::move(*projected);
+    const long periods = result.multipliers.periods;
+    result = from_whole_matrix(monodromy, dofs);
+    result.multipliers.periods += periods;
+  }
+  else if (projected && !is_decided(result))
+  {
+    projected->multipliers.periods = result.multipliers.periods;
+    return std::move(*projected);
   }
   result.multipliers.refusal = projected ? projected->multipliers.would_decide : std::move(refusal);
   return result;
