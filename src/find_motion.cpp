@@ -335,7 +335,7 @@ bool steps_may_decide(const MotionSearch& search)
   const SettledMotion& settled = search.found.settled;
   const bool open = scene.fidelity == CycleModel::automatic && scene.cycle.steps_per_period == 0 &&
                     scene.cycle.start.kind != CycleStartKind::coarse;
-  const double of_period = finer * settled.steps_per_period * work_of_step(search.point.model->structure);
+  const double of_period = finer * search.found.cycle.steps_per_period * work_of_step(search.point.model->structure);
   if (!open || !has_run(settled.outcome) || of_settling * of_period > affordable_work) return false;
   const SettledBySteps now = by_steps(settled);
   if (const std::optional<SettledBySteps>& before = search.by_fewer_steps)
@@ -349,7 +349,7 @@ bool takes_finer_steps(MotionSearch& search)
   constexpr int finest = 1024;
   SettledMotion& settled = search.found.settled;
   if (search.ended || !steps_may_decide(search)) return false;
-  search.begin_steps = finer * settled.steps_per_period;
+  search.begin_steps = finer * search.found.cycle.steps_per_period;
   search.by_fewer_steps = by_steps(settled);
   if (search.begin_steps <= finest) return true;
   leave_to_finer_steps(settled);

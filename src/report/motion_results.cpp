@@ -145,6 +145,7 @@ void add_reached(Entry out, const ReachedMotion& motion)
 void add_line(Entry out, const Line& line)
 {
   out.add("frequency_hz", "Hz", "the strongest lines of its spectrum", line.frequency_hz);
+  out.add("frequency_error", "Hz", "their error bars, by the length and half as many steps", line.frequency_error);
   out.add("amplitude", "m or N", "their amplitudes", line.amplitude);
 }
 
@@ -179,16 +180,19 @@ void add_transient(Entry out, const Report& report)
 {
   const Trajectory& run = report.transient;
   const std::vector<ComplexMode>& modes = report.point.modes.modes;
-  const StepBias bias = modes.empty() ? StepBias{} : bias_of(modes.front().lambda, run.predicted);
+  const bool follows = !modes.empty() && std::isfinite(run.predicted.real());
+  const StepBias bias = follows ? bias_of(modes.front().lambda, run.predicted) : StepBias{};
+  const Entry of_mode = follows ? out : out.hidden();
   const double fit = run.growth_rate_fit, predicted = run.predicted.real();
   out.show("theta", "-", "parameter of the theta-method", run.theta);
   out.show("steps", "-", "time steps made", run.steps);
   out.show("step_size", "s", "time step", run.step_size);
-  out.show("periods", "-", "length in periods of the followed mode", run.periods);
-  out.show("growth_rate_fit", "1/s", "its growth rate before first lift-off; `null`: too short", run.growth_rate_fit);
-  out.show("growth_rate_predicted", "1/s", "growth rate by the theory of the scheme", run.predicted.real());
-  out.show("growth_rate_bias", "-", "relative error of the growth rate by theta and the step", bias.growth);
-  out.show("frequency_bias", "-", "relative error of the frequency by theta and the step", bias.frequency);
+  of_mode.show("periods", "-", "length in periods of the followed mode", run.periods);
+  of_mode.show("growth_rate_fit", "1/s", "its growth rate before first lift-off; `null`: too short",
+               run.growth_rate_fit);
+  of_mode.show("growth_rate_predicted", "1/s", "growth rate by the theory of the scheme", run.predicted.real());
+  of_mode.show("growth_rate_bias", "-", "relative error of the growth rate by theta and the step", bias.growth);
+  of_mode.show("frequency_bias", "-", "relative error of the frequency by theta and the step", bias.frequency);
   add_chatter(out, run.history);
   out.show("energy_defect_max", "-", "largest defect of the energy identity over the energy", run.energy_defect_max);
   if (out.has(!run.history.joint_work.empty()))
@@ -256,7 +260,7 @@ void add_settled(Entry out, const Report& report)
   out.add("would_decide", "text", "of an undecided one: what would decide", motion.verdict.would_decide);
   out.show("periods", "-", "windows of a period that were integrated", motion.periods());
   out.show("discarded", "-", "of these, before the motion was stationary", motion.discarded);
-  out.show("period", "s", "length of a window: the nearest recurrence of the free motion", settled.period);
+  out.show("period", "s", "length of a window: the period of its strongest line", settled.period);
   out.add("steps_per_period", "-", "time steps of a window", settled.steps_per_period);
   out.mean("mean_energy", "J", "mean mechanical energy", settled.energy);
   out.mean("mean_fluctuating_energy", "J", "mean energy about equilibrium", settled.fluctuating_energy);

@@ -5,6 +5,7 @@
 #include "squeal/base/run_control.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace squeal
@@ -49,12 +50,17 @@ int largest_probe(const History& history)
   return history.probes.empty() ? -1 : static_cast<int>(largest - history.probes.begin());
 }
 
+const std::vector<double>& series_of(const History& history, int probe)
+{
+  return probe < 0 ? history.normal_force : history.probes[static_cast<std::size_t>(probe)];
+}
+
 PeriodSample sample_of(const History& history, int probe)
 {
   PeriodSample sample{{mean(history.fluctuating_energy), mean(history.energy), mean(history.damping_power),
                        mean(history.contact_power), mean(history.load_power), mean(history.open), mean(history.stick),
                        mean(history.slip)},
-                      probe < 0 ? history.normal_force : history.probes[static_cast<std::size_t>(probe)],
+                      series_of(history, probe),
                       probe < 0 ? std::vector<double>() : history.normal_force};
   for (const auto& one : history.probes) sample.means.push_back(swing(one));
   return sample;
@@ -65,8 +71,7 @@ PeriodSample sample_of(const History& history, int probe)
 PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, PetscInt shapes, SettledMotion& motion)
 {
   History& all = motion.history;
-  const bool first = all.time.empty();
-  const double begun = first ? 0 : all.time.back();
+  const double begun = all.time.empty() ? 0 : all.time.back();
   State now{copy_of(displacement(state)), copy_of(velocity(state)), begun, map.reactions};
   map.records.clear();
   map.records.resize(static_cast<std::size_t>(map.steps));
@@ -86,8 +91,26 @@ PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, PetscIn
   check(VecCopy(now.u, displacement(state)));
   check(VecCopy(now.v, velocity(state)));
   append(history, all);
-  if (first) motion.spectrum_probe = largest_probe(history);
   return sample_of(history, motion.spectrum_probe);
+}
+
+/// Where the motion's own period is not the window that the search ended with, it becomes the window, in steps as long.
+/// A stretch of the motion, which is not counted, shows the probe that swings most and its strongest line.
+void take_own_period(const CycleProblem& problem, PeriodMap& map, Vec state, SettledMotion& motion)
+{
+  constexpr int stretch = 64;                // windows
+  constexpr double fewest = 8, alike = 0.05; // steps in a period, since rounding has lines, too; of the window
+  SettledMotion seen;
+  for (int k = 0; k < stretch; ++k) integrate_period(map, problem.probes, state, 0, seen);
+  motion.spectrum_probe = largest_probe(seen.history);
+  const double step = motion.period / motion.steps_per_period;
+  const double own =
+      1 / base_frequencies(spectrum_of(series_of(seen.history, motion.spectrum_probe), step)).first; // may be infinite
+  if (!std::isfinite(own) || own < fewest * step || std::abs(own / motion.period - 1) < alike) return;
+  motion.period = own;
+  motion.steps_per_period = static_cast<int>(std::lround(own / step));
+  map.steps = motion.steps_per_period;
+  set_period(map, own);
 }
 
 /// Names the parts of what was examined.
@@ -121,14 +144,23 @@ void note_undecided(SettledMotion& motion)
     motion.outcome.reason = "undecided between " + verdict.between + ": " + verdict.would_decide;
 }
 
-/// The mean fluctuating energy with half as many steps a period, from where the motion ends. It is of the second half
-/// of as many periods as cost a quarter of the motion's own.
-MeanValue energy_by_half_the_steps(const CycleProblem& problem, const SettledMotion& motion, double theta, Vec end)
+/// The frequency of the line nearest to another one; that one where there is none.
+double nearest_line(const Spectrum& spectrum, double frequency)
+{
+  const auto nearest = std::ranges::min_element(
+      spectrum.lines, {}, [&](const Line& line) { return std::abs(line.frequency_hz - frequency); });
+  return nearest == spectrum.lines.end() ? frequency : nearest->frequency_hz;
+}
+
+/// Sets what half as many steps a period change, from where the motion ends: the mean fluctuating energy, and as part
+/// of their bars the frequencies of lines. Seen is the second half of as many periods as cost a quarter of the motion's
+/// own.
+void add_step_errors(const CycleProblem& problem, double theta, Vec end, SettledMotion& motion)
 {
   PeriodMap map{problem.sliding, problem.step, std::max(motion.steps_per_period / 2, 1), theta};
   set_period(map, motion.period);
   State now{copy_of(displacement(end)), copy_of(velocity(end)), 0, problem.sliding.equilibrium.reactions};
-  std::vector<double> energies;
+  std::vector<double> energies, signal;
   const std::size_t periods = std::max<std::size_t>(motion.examined.periods() / 2, 1);
   while (energies.size() < periods)
   {
@@ -136,8 +168,15 @@ MeanValue energy_by_half_the_steps(const CycleProblem& problem, const SettledMot
     if (march(map.step, map.sliding, map.steps, now, {problem.probes, history, nullptr}).interrupted)
       throw Interrupted{};
     energies.push_back(mean(history.fluctuating_energy));
+    const std::vector<double>& series = series_of(history, motion.spectrum_probe);
+    if (energies.size() > periods / 2) signal.insert(signal.end(), series.begin(), series.end());
   }
-  return batch_mean(std::span(energies).subspan(periods / 2));
+  motion.step_error =
+      std::abs(batch_mean(std::span(energies).subspan(periods / 2)).value - motion.fluctuating_energy.value);
+  const double first = motion.examined.base.first;
+  const double part = std::abs(nearest_line(spectrum_of(signal, motion.period / map.steps), first) / first - 1);
+  for (Line& line : motion.examined.spectrum.lines)
+    if (std::isfinite(part)) line.frequency_error += part * line.frequency_hz;
 }
 
 /// The largest exponent with four times as many steps a period, from where the motion ends, over as many periods as
@@ -206,7 +245,8 @@ void take_as_answer(const SettledMotion& motion, Outcome& of_cycle)
 SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, SettledOptions options)
 {
   const double of_period = cycle.steps_per_period * work_of_step(problem.sliding.structure);
-  if (options.periods == 0) options.periods = is_dear(of_period) ? 512 : 2048;
+  const bool chosen = options.periods == 0;
+  if (chosen) options.periods = is_dear(of_period) ? 512 : 2048;
   SettledMotion motion;
   PeriodMap map{problem.sliding, problem.step, cycle.steps_per_period, cycle.theta};
   map.reactions = problem.sliding.equilibrium.reactions;
@@ -215,6 +255,10 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
   motion.steps_per_period = cycle.steps_per_period;
   motion.period = cycle.free.period;
   Owned<Vec> state = copy_of(cycle.free.state.get());
+  take_own_period(problem, map, state, motion);
+  constexpr PetscInt least = 128;                   // periods, fewer of which show no kind
+  if (chosen && map.steps > cycle.steps_per_period) // as many steps in all
+    options.periods = std::max(least, options.periods * cycle.steps_per_period / map.steps);
   motion.shapes = no_shapes(problem.sliding.structure.M);
   motion.sampled_steps = steps_between_samples(motion.steps_per_period, motion.period / motion.steps_per_period);
   const auto sampler = [&](Vec now) { return integrate_period(map, problem.probes, now, options.shapes, motion); };
@@ -223,8 +267,7 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
   motion.end = {copy_of(displacement(state)), copy_of(velocity(state)), motion.history.time.back(), map.reactions};
   const std::size_t windows = motion.examined.periods(), samples = motion.shapes.squares.size() / windows;
   keep_strongest(motion.shapes, motion.examined.discarded % windows * samples);
-  motion.step_error =
-      std::abs(energy_by_half_the_steps(problem, motion, cycle.theta, state).value - motion.fluctuating_energy.value);
+  add_step_errors(problem, cycle.theta, state, motion);
   const bool stationary = motion.examined.discarded < motion.examined.periods();
   motion.outcome = {OutcomeKind::settled, "", static_cast<int>(motion.examined.periods()), 0};
   if (!stationary) motion.outcome.kind = OutcomeKind::not_converged;

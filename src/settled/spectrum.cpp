@@ -25,7 +25,8 @@ Line line_at(const Spectrum& spectrum, std::size_t place)
   const double away = std::clamp((2 * ratio - 1) / (ratio + 1), 0., 0.5) * (after > before ? 1 : -1);
   const double angle = std::numbers::pi * away;
   const double height = std::abs(away) < 1e-6 ? 1 : std::sin(angle) / (angle * (1 - away * away));
-  return {(static_cast<double>(place) + away) * spectrum.resolution_hz, here / height};
+  constexpr double bar = 0.1; // of the resolution
+  return {(static_cast<double>(place) + away) * spectrum.resolution_hz, here / height, bar * spectrum.resolution_hz};
 }
 
 /// Whether a line is of contact that alternates from step to step, which fewer than 2.2 samples a period show.

@@ -11,7 +11,8 @@ namespace squeal
 struct Line
 {
   double frequency_hz = 0;
-  double amplitude = 0; // in the signal's unit
+  double amplitude = 0;       // in the signal's unit
+  double frequency_error = 0; // [Hz] error bar, by the length of the signal
 };
 
 /// An amplitude spectrum and its lines.
