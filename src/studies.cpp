@@ -26,21 +26,22 @@ Response run_response(const SlidingPoint& point, const Scene& scene, const Progr
 namespace
 {
 
-/// Whether several modes oscillate and grow, each of which may lead to a motion of its own, and a few trajectories of
-/// the model cost little.
-bool may_lead_elsewhere(const SlidingPoint& point)
-{
-  constexpr double steps = 16. * 400 * 256; // of starts, periods each, steps a period
-  const auto oscillates = [](const ComplexMode& mode) { return mode.frequency_hz() > 0; };
-  return steps * work_of_step(point.model->structure) <= affordable_work &&
-         std::ranges::count_if(point.modes.unstable(), oscillates) > 1;
-}
-
-/// The modes, their pairs and five random sums; as many as are integrated together at most.
-int starts_beside(int unstable)
+/// Where several modes oscillate and grow, each of which may lead to a motion of its own: the modes, their pairs and
+/// five random sums; as many as are integrated together at most. Else none.
+int starts_beside(const SlidingPoint& point)
 {
   constexpr int random = 5, together = 16;
+  const auto oscillates = [](const ComplexMode& mode) { return mode.frequency_hz() > 0; };
+  const int unstable = point.modes.unstable_count;
+  if (std::ranges::count_if(point.modes.unstable(), oscillates) < 2) return 0;
   return std::min(unstable * (unstable + 1) / 2 + random, together);
+}
+
+/// Whether so many trajectories of the model and a small one cost little.
+bool are_affordable(const SlidingPoint& point, int starts)
+{
+  constexpr double steps = 400 * 256; // of periods each, steps a period
+  return (starts + 1) * steps * work_of_step(point.model->structure) <= affordable_work;
 }
 
 } // namespace
@@ -52,15 +53,16 @@ Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const
   CycleSettings settings = scene.cycle;
   if (settings.steps_per_period == 0)
     settings.steps_per_period = std::clamp(motion.cycle.steps_per_period, first_steps, enough);
-  if (!settings.enabled || (settings.starts == 0 && !may_lead_elsewhere(point)))
-    return not_run<Attractors>(OutcomeKind::off, "cycle.starts is 0, and no other starts are sought by themselves");
   const std::vector<ComplexMode>& modes = point.modes.modes;
   const bool chosen = settings.starts == 0;
-  if (chosen) settings.starts = starts_beside(point.modes.unstable_count);
+  if (chosen) settings.starts = starts_beside(point);
+  if (!settings.enabled || (chosen && (point.modes.unstable_count == 0 || !are_affordable(point, settings.starts))))
+    return not_run<Attractors>(OutcomeKind::off, "cycle.starts is 0, and no other starts are sought by themselves");
   const auto attractors = [&](const UnstableModes& started)
   {
-    Attractors found = find_attractors({point.sliding(), modes, started, settings, options.step});
+    Attractors found = find_attractors({point.sliding(), modes, started, settings, options.step, chosen});
     if (chosen && found.outcome.kind == OutcomeKind::not_converged) found.outcome.kind = OutcomeKind::completed;
+    if (chosen && found.outcome.kind == OutcomeKind::refused) found.outcome.kind = OutcomeKind::skipped;
     return found;
   };
   if (modes.empty() || point.modes.unstable_count > 0 || point.model->interface.pairs == 0)

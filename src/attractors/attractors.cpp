@@ -4,6 +4,7 @@
 
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/transient/step_guards.hpp"
 
 #include <algorithm>
 #include <array>
@@ -33,9 +34,9 @@ struct Watched
 class Swarm
 {
 public:
-  Swarm(const AttractorProblem& problem, std::vector<NamedStart> starts)
-      : problem_(problem), steps_per_period_(problem.settings.steps_per_period),
-        rest_force_(zeros_like(problem.sliding.equilibrium.u)), watched_(starts.size())
+  Swarm(const AttractorProblem& problem, int steps_per_period, std::vector<State> starts)
+      : problem_(problem), steps_per_period_(steps_per_period), rest_force_(zeros_like(problem.sliding.equilibrium.u)),
+        states_(std::move(starts)), watched_(states_.size())
   {
     const auto& [structure, interface, equilibrium] = problem.sliding;
     const double period = 1 / problem.unstable.modes.front().frequency_hz();
@@ -45,17 +46,16 @@ public:
     rest_energy_ /= 2;
     for (std::size_t i = 0; i < std::min(coordinates, problem.modes.size()); ++i)
       shapes_.push_back(problem.modes[i].real);
-    for (NamedStart& start : starts) states_.push_back(std::move(start.state));
     for (State& state : states_) works_.push_back(begin_steps(step_, structure, interface, state));
   }
 
   long periods() const { return steps_ / steps_per_period_; }
+  const State& now(std::size_t k) const { return states_[k]; }
 
-  /// To the end of the period at hand.
-  void integrate_period()
+  void integrate_to(long periods)
   {
     const MPI_Comm comm = comm_of(problem_.sliding.structure.load);
-    for (const long end = (periods() + 1) * steps_per_period_; steps_ < end;)
+    while (steps_ < periods * steps_per_period_)
     {
       ++steps_;
       const std::vector<StepReport> reports =
@@ -116,8 +116,8 @@ private:
   double rest_energy_ = 0;
   std::vector<Vec> shapes_;
   std::vector<State> states_;
-  std::vector<StepWork> works_;
   std::vector<Watched> watched_;
+  std::vector<StepWork> works_;
   long steps_ = 0;
 };
 
@@ -132,19 +132,59 @@ bool all_settled(const std::vector<ReachedMotion>& motions, long periods)
                       });
 }
 
+/// Adds to the bars of motions what half as many steps a period change, from where each one's first start has ended,
+/// over as many periods.
+void add_step_errors(const AttractorProblem& problem, const Swarm& swarm, std::vector<ReachedMotion>& motions)
+{
+  std::vector<ReachedMotion*> moving;
+  std::vector<State> ends;
+  for (ReachedMotion& motion : motions)
+  {
+    if (motion.kind == ReachedKind::rest) continue;
+    moving.push_back(&motion);
+    ends.push_back(copy_of(swarm.now(motion.starts.front())));
+  }
+  if (moving.empty()) return;
+  Swarm coarse(problem, std::max(problem.settings.steps_per_period / 2, 1), std::move(ends));
+  coarse.integrate_to(swarm.periods());
+  const std::vector<ReachedMotion> others = coarse.reached();
+  for (std::size_t k = 0; k < moving.size(); ++k)
+  {
+    moving[k]->energy.error += std::abs(others[k].energy.value - moving[k]->energy.value);
+    moving[k]->frequency.error += std::abs(others[k].frequency.value - moving[k]->frequency.value);
+  }
+}
+
 } // namespace
 
 Attractors find_attractors(const AttractorProblem& problem)
 {
-  std::vector<NamedStart> starts = make_starts(problem);
   Attractors found;
-  for (const NamedStart& start : starts) found.starts.push_back(start.name);
-  Swarm swarm(problem, std::move(starts));
+  const int steps = problem.settings.steps_per_period;
+  found.outcome.reason = friction_refusal(problem.sliding, &problem.unstable.modes.front(), problem.settings.theta,
+                                          1 / (problem.unstable.modes.front().frequency_hz() * steps), problem.step, 1);
+  if (!found.outcome.reason.empty())
+  {
+    found.outcome.kind = OutcomeKind::refused;
+    return found;
+  }
+  std::vector<State> states;
+  for (NamedStart& start : make_starts(problem))
+  {
+    found.starts.push_back(start.name);
+    states.push_back(std::move(start.state));
+  }
+  if (states.empty())
+  {
+    found.outcome = {OutcomeKind::skipped, "no amplitude is known that contact limits", 0, 0};
+    return found;
+  }
+  Swarm swarm(problem, steps, std::move(states));
   Progress progress(comm_of(problem.sliding.structure.load), "attractors", static_cast<double>(most_periods));
   std::vector<ReachedMotion> motions;
   for (long target = block;; target += block) // of periods, after which the energies are looked at
   {
-    while (swarm.periods() < target) swarm.integrate_period();
+    swarm.integrate_to(target);
     found.periods = target;
     motions = swarm.reached();
     progress.update(static_cast<double>(target), format("%ld periods", target));
@@ -152,6 +192,8 @@ Attractors find_attractors(const AttractorProblem& problem)
   }
   const bool settled = all_settled(motions, std::numeric_limits<long>::max());
   found.motions = joined(std::move(motions));
+  add_step_errors(problem, swarm, found.motions);
+  found.motions = joined(std::move(found.motions)); // which the error of the step may have told apart
   found.outcome = {settled ? OutcomeKind::completed : OutcomeKind::not_converged,
                    settled ? "" : format("some motions had not settled after %ld periods", found.periods), 0, 0};
   return found;

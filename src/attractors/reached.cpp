@@ -54,10 +54,10 @@ bool agree(const ReachedMotion& a, const ReachedMotion& b)
   return agree(a.energy, b.energy, 0.01) && agree(a.frequency, b.frequency, 1e-3);
 }
 
-bool is_cycle(const ReachedMotion& motion, double energy, double frequency)
+bool is_cycle(const ReachedMotion& motion, const MeanValue& energy, const MeanValue& frequency)
 {
-  const double times = std::max(1., std::round(motion.frequency.value / frequency));
-  return agree(motion, {motion.kind, {energy, 0}, {times * frequency, 0}, {}});
+  const double times = std::max(1., std::round(motion.frequency.value / frequency.value));
+  return agree(motion, {motion.kind, energy, {times * frequency.value, times * frequency.error}, {}});
 }
 
 ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<double>& crossings, double rest)

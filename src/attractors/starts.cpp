@@ -19,24 +19,36 @@ State resting(const Equilibrium& equilibrium)
   return {copy_of(equilibrium.u.get()), zeros_like(equilibrium.u), 0, equilibrium.reactions};
 }
 
-/// The largest estimated displacement of an unstable mode: random motions are of its size.
-double reference_amplitude(const UnstableModes& unstable)
+/// Amplitudes of modes in random motions. [m]
+struct AmplitudeRange
+{
+  double least = 0, ratio = 1; // of the greatest to the least
+};
+
+/// A tenth to twice the largest estimate of an unstable mode. Beside an equilibrium that is stable, half the first
+/// event to four times the last one: what can attract is beyond the one, and may be beyond the other.
+AmplitudeRange amplitude_range(const UnstableModes& unstable)
 {
   double amplitude = 0;
   for (const Estimate& estimate : unstable.estimates)
     if (std::isfinite(estimate.start_amplitude)) amplitude = std::max(amplitude, estimate.start_amplitude);
-  return amplitude;
+  const Estimate& first = unstable.estimates.front();
+  if (unstable.modes.front().growth_rate() > 0 || !std::isfinite(first_event(first))) return {0.1 * amplitude, 20};
+  double last = 0;
+  for (const double event : {first.lift_off_amplitude, first.reversal_amplitude})
+    if (std::isfinite(event)) last = std::max(last, event);
+  return {0.5 * first_event(first), 8 * last / first_event(first)};
 }
 
-/// The sum of the least stable modes with random phases, each 0.1 to 2 times as large as the reference.
+/// The sum of the least stable modes with random phases and amplitudes.
 State random_start(const AttractorProblem& problem, std::mt19937_64& generator)
 {
   State start = resting(problem.sliding.equilibrium);
-  const double reference = reference_amplitude(problem.unstable);
+  const auto [least, ratio] = amplitude_range(problem.unstable);
   for (std::size_t i = 0; i < std::min(random_modes, problem.modes.size()); ++i)
   {
-    const double factor = 0.1 * std::pow(20., uniform(generator)), phase = two_pi * uniform(generator);
-    State motion = mode_state(problem.sliding.equilibrium, problem.modes[i], factor * reference, phase);
+    const double amplitude = least * std::pow(ratio, uniform(generator)), phase = two_pi * uniform(generator);
+    State motion = mode_state(problem.sliding.equilibrium, problem.modes[i], amplitude, phase);
     check(VecAXPY(motion.u, -1, problem.sliding.equilibrium.u));
     add_motion(motion, 1, start);
   }
@@ -69,6 +81,9 @@ std::vector<NamedStart> make_starts(const AttractorProblem& problem)
   std::mt19937_64 generator(1); // equal runs draw equal starts
   for (int number = 1; starts.size() < wanted; ++number)
     starts.push_back({format("random %d", number), random_start(problem, generator)});
+  const double event = first_event(problem.unstable.estimates.front());
+  if (problem.from_small && event > 0 && std::isfinite(event)) // smaller motions come through its state
+    starts.push_back({"growth of mode 1", mode_state(equilibrium, problem.unstable.modes.front(), event / 2, 0)});
   return starts;
 }
 

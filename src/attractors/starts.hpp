@@ -11,7 +11,8 @@ struct NamedStart
   State state;
 };
 
-/// Each unstable mode at its estimate, pairs of them, and random sums of modes up to the number asked for.
+/// Each unstable mode at its estimate, pairs of them, and random sums of modes up to the number asked for; behind them
+/// the small motion, where it is asked for.
 std::vector<NamedStart> make_starts(const AttractorProblem& problem);
 
 } // namespace squeal

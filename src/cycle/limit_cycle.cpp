@@ -203,7 +203,7 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
                        std::nan("")};
     return skipped;
   }
-  const double first_event = std::min(estimate.lift_off_amplitude, estimate.reversal_amplitude) * unit_norm(problem);
+  const double limited_from = first_event(estimate) * unit_norm(problem);
   const bool is_cycle = problem.given_period > 0; // it needs no free periods
   ShootingStart start{equilibrium.u,
                       first->u,
@@ -211,7 +211,7 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
                       is_cycle ? problem.given_period : 1 / mode.frequency_hz(),
                       {mode.real, mode.imaginary, equilibrium.u},
                       {},
-                      first_event,
+                      limited_from,
                       is_cycle,
                       problem.given_rounds};
   start.other_unstable = other_unstable_states(problem);

@@ -89,6 +89,28 @@ std::string energy_text(const MeanValue& energy)
   return format(", mean energy %.*g +- %.0e J", digits, energy.value, energy.error);
 }
 
+/// A motion that starts lead to and that is not the answer, the one that most of them lead to; empty: there is none.
+template <class IsOther> std::string starts_beside(const Report& report, const char* to, const IsOther& is_other)
+{
+  const Attractors& attractors = report.attractors;
+  if (!has_run(attractors.outcome)) return {};
+  const auto other = std::ranges::find_if(attractors.motions, is_other); // those that most starts lead to come first
+  if (other == attractors.motions.end()) return {};
+  return format(", but %zu of %zu starts lead to a %s at %.5g Hz, mean energy %.3g J", other->starts.size(),
+                attractors.starts.size(), to, other->frequency.value, other->energy.value);
+}
+
+/// A cycle that starts lead to in place of the settled motion.
+std::string steady_starts_text(const Report& report)
+{
+  const SettledMotion& settled = report.motion.settled;
+  const MeanValue energy{settled.fluctuating_energy.value, settled.fluctuating_energy.error + settled.step_error},
+      frequency{settled.examined.base.first, 0};
+  return starts_beside(report, "cycle",
+                       [&](const ReachedMotion& motion)
+                       { return motion.kind == ReachedKind::steady && !is_cycle(motion, energy, frequency); });
+}
+
 std::string settled_text(const Report& report, const Scene& scene)
 {
   const ExaminedMotion& motion = report.motion.settled.examined;
@@ -115,12 +137,19 @@ std::string settled_text(const Report& report, const Scene& scene)
   MeanValue energy = report.motion.settled.fluctuating_energy;
   energy.error += report.motion.settled.step_error;
   text += beside_mode(report, first) + energy_text(energy) +
-          largest_swing(scene, report.motion.settled.peak_to_peak, [](const MeanValue& swing) { return swing.value; });
+          largest_swing(scene, report.motion.settled.peak_to_peak, [](const MeanValue& swing) { return swing.value; }) +
+          steady_starts_text(report);
   if (!depends_on_steps(report.motion.settled)) return text;
   return text +
          format("; by %d steps a period, and half as many change the energy by %.0f %%: more may change the kind",
                 report.motion.settled.steps_per_period,
                 100 * report.motion.settled.step_error / report.motion.settled.fluctuating_energy.value);
+}
+
+/// A mean with the relative error of the step, where that is known.
+MeanValue with_step_error(double value, double relative)
+{
+  return {value, std::isfinite(relative) ? relative * value : 0};
 }
 
 /// How many of the scene's other starts lead to the cycle, and where most of the others lead; empty: all that have
@@ -129,12 +158,15 @@ std::string starts_text(const Report& report)
 {
   const Attractors& attractors = report.attractors;
   const LimitCycle& cycle = report.motion.cycle;
+  const Fidelity& fidelity = report.motion.fidelity;
   if (!has_run(attractors.outcome) || attractors.motions.empty()) return {};
+  const MeanValue energy = with_step_error(cycle.measured.mean_fluctuating_energy, fidelity.step_energy_error),
+                  frequency = with_step_error(1 / cycle.orbit.period, fidelity.step_frequency_error);
   std::size_t all = 0, here = 0;
   const ReachedMotion* other = nullptr; // they come by falling number of starts
   for (const ReachedMotion& motion : attractors.motions)
   {
-    const bool same = is_cycle(motion, cycle.measured.mean_fluctuating_energy, 1 / cycle.orbit.period);
+    const bool same = is_cycle(motion, energy, frequency);
     if (motion.kind == ReachedKind::unsettled && !same) continue; // it may still come there
     all += motion.starts.size();
     if (same && motion.kind != ReachedKind::varying)
@@ -150,6 +182,15 @@ std::string starts_text(const Report& report)
                 other->starts.size(), elsewhere.c_str());
 }
 
+/// By how much the step may be off, where that is more than was asked.
+std::string missed_accuracy(const Fidelity& fidelity)
+{
+  const double error = std::max(fidelity.step_frequency_error, fidelity.step_energy_error);
+  if (!(error > fidelity.accuracy)) return {};
+  return format("; by its steps frequency and energy are known to %.2g %%, where %.2g %% was asked", 100 * error,
+                100 * fidelity.accuracy);
+}
+
 std::string cycle_sentence(const Report& report, const Scene& scene)
 {
   const LimitCycle& cycle = report.motion.cycle;
@@ -157,21 +198,16 @@ std::string cycle_sentence(const Report& report, const Scene& scene)
   return format("squeals at %.5g Hz", frequency) + beside_mode(report, frequency) +
          largest_swing(scene, cycle.measured.peak_to_peak, [](double swing) { return swing; }) +
          stability_text(cycle.multipliers) + starts_text(report) +
-         (report.point.modes.unstable_count == 0 ? ", beside a stable equilibrium that another start leads to" : "");
+         (report.point.modes.unstable_count == 0 ? ", beside a stable equilibrium that another start leads to" : "") +
+         missed_accuracy(report.motion.fidelity);
 }
 
 /// The motion that most of the starts lead to beside a stable equilibrium; empty: all that have settled come to rest.
 std::string beside_rest(const Report& report)
 {
-  const Attractors& attractors = report.attractors;
-  if (!has_run(attractors.outcome)) return {};
-  const auto goes_on =
-      std::ranges::find_if(attractors.motions, // those that most starts lead to come first
-                           [](const ReachedMotion& motion)
-                           { return motion.kind == ReachedKind::steady || motion.kind == ReachedKind::varying; });
-  if (goes_on == attractors.motions.end()) return {};
-  return format(", but %zu of %zu starts lead to a motion at %.5g Hz", goes_on->starts.size(), attractors.starts.size(),
-                goes_on->frequency.value);
+  return starts_beside(report, "motion",
+                       [](const ReachedMotion& motion)
+                       { return motion.kind == ReachedKind::steady || motion.kind == ReachedKind::varying; });
 }
 
 /// Without a cycle.

@@ -298,11 +298,12 @@ Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedS
                  first_amplitude(std::hypot(pair.drive[0], pair.drive[1]), std::abs(along_drive(pair))));
   }
   result.friction_rate_linear = linear / energy;
-  const double first_event = std::min(result.lift_off_amplitude, result.reversal_amplitude);
-  if (first_event == infinity || first_event <= 0)
+  const double first = first_event(result);
+  const double limit = result.lift_off_amplitude < infinity ? result.lift_off_amplitude : result.reversal_amplitude;
+  if (first == infinity || first <= 0)
   {
     result.outcome = {OutcomeKind::no_balance, "nothing saturates the interface force", 0, 0};
-    result.start_amplitude = lift_off_multiple * result.lift_off_amplitude;
+    result.start_amplitude = lift_off_multiple * limit;
     return result;
   }
   // Each pair's share of an absolute tolerance; the rule's finer half is far better than the difference it is held to.
@@ -316,13 +317,17 @@ Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedS
     MPI_Allreduce(MPI_IN_PLACE, &power, 1, MPI_DOUBLE, MPI_SUM, comm);
     return power / energy;
   };
-  find_balance(result, rate, first_event);
+  find_balance(result, rate, first);
   result.mean_energy = energy * result.amplitude * result.amplitude;
-  const double q = result.outcome.kind == OutcomeKind::balance ? result.amplitude : result.lift_off_amplitude;
+  const double q = result.outcome.kind == OutcomeKind::balance ? result.amplitude : limit;
   if (q < infinity) result.phase = best_phase(pairs, q);
-  result.start_amplitude =
-      result.outcome.kind == OutcomeKind::balance ? result.amplitude : lift_off_multiple * result.lift_off_amplitude;
+  result.start_amplitude = result.outcome.kind == OutcomeKind::balance ? result.amplitude : lift_off_multiple * limit;
   return result;
+}
+
+double first_event(const Estimate& estimate)
+{
+  return std::min(estimate.lift_off_amplitude, estimate.reversal_amplitude);
 }
 
 std::optional<State> estimated_motion(const Equilibrium& equilibrium, const ComplexMode& mode, const Estimate& estimate)

@@ -20,6 +20,14 @@ def test_all_starts_lead_to_the_cycle_that_attracts(converged):
     assert abs(motion["frequency_hz"] - cycle["frequency_hz"]) < motion["frequency_error"] + 1e-4 * cycle["frequency_hz"]
 
 
+def test_a_small_motion_is_followed_without_being_asked(converged):
+    report = converged(*SCENE, ranks=1).report
+    (motion,) = report["attractors"]["motions"]
+    assert report["attractors"]["starts"] == ["growth of mode 1"] and motion["kind"] == "steady"
+    assert abs(motion["frequency_hz"] - report["cycle"]["frequency_hz"]) < motion["frequency_error"]
+    assert "other start" not in report["heard"]
+
+
 def test_ranks(module_run):
     """Ranks agree on what is reached."""
     one = module_run(*SCENE, "--set", "cycle.starts=4", ranks=1)["attractors"]["motions"]
@@ -36,7 +44,8 @@ def test_several_unstable_modes_show_each_motion(squeal, tmp_path):
     found = run.report["attractors"]
     assert found["starts"][:3] == ["mode 1", "mode 2", "modes 1 and 2"]
     both, *alone = found["motions"]
-    assert both["starts"] == list(range(2, 8)) and sorted(motion["starts"] for motion in alone) == [[0], [1]]
+    assert both["starts"] == list(range(2, 8)) and found["starts"][8] == "growth of mode 1"
+    assert sorted(motion["starts"] for motion in alone) == [[0, 8], [1]]
     # the copy is slower and of the same stiffness: the same energy, which sums
     for motion in alone:
         assert motion["mean_fluctuating_energy"] == pytest.approx(both["mean_fluctuating_energy"] / 2, rel=0.03)

@@ -95,9 +95,10 @@ TEST_CASE("motions are joined by energy and frequency, the one with most starts 
 
 TEST_CASE("a motion is the cycle whose period its coordinate crosses zero in once or several times")
 {
-  CHECK(is_cycle(motion(ReachedKind::steady, 2, 100, 0), 2.01, 100.05));
-  CHECK(is_cycle(motion(ReachedKind::steady, 2, 200, 0), 2.01, 100.05));
-  CHECK(!is_cycle(motion(ReachedKind::steady, 2, 150, 0), 2, 100));
-  CHECK(!is_cycle(motion(ReachedKind::steady, 2, 50, 0), 2, 100)); // of twice the period
-  CHECK(!is_cycle(motion(ReachedKind::steady, 1, 100, 0), 2, 100));
+  CHECK(is_cycle(motion(ReachedKind::steady, 2, 100, 0), {2.01, 0}, {100.05, 0}));
+  CHECK(is_cycle(motion(ReachedKind::steady, 2, 200, 0), {2.01, 0}, {100.05, 0}));
+  CHECK(!is_cycle(motion(ReachedKind::steady, 2, 150, 0), {2, 0}, {100, 0}));
+  CHECK(!is_cycle(motion(ReachedKind::steady, 2, 50, 0), {2, 0}, {100, 0}));         // of twice the period
+  CHECK(is_cycle(motion(ReachedKind::steady, 2, 100, 0), {2.1, 0.1}, {100.3, 0.3})); // by the cycle's own bars
+  CHECK(!is_cycle(motion(ReachedKind::steady, 1, 100, 0), {2, 0}, {100, 0}));
 }

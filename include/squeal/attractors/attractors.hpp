@@ -10,7 +10,8 @@
 namespace squeal
 {
 
-/// outcome: "completed"; "not converged" where the energy of some motion still had a trend; "skipped"; "off".
+/// outcome: "completed"; "not converged" where the energy of some motion still had a trend; "refused" where a step may
+/// have several solutions; "skipped"; "off".
 struct Attractors
 {
   Outcome outcome;
@@ -27,10 +28,12 @@ struct AttractorProblem
   UnstableModes unstable;
   const CycleSettings& settings; // its starts, its steps a period and theta
   const StepOptions& step;
+  bool from_small = false; // whether a small motion of the mode that grows fastest starts as well
 };
 
 /// Integrates the motions of all starts together until their energies have settled, for at most 400
-/// periods of the followed mode. Collective. Where the run is asked to end it throws Interrupted.
+/// periods of the followed mode. Bars hold what half as many steps a period change. Collective. Where the run is asked
+/// to end it throws Interrupted.
 Attractors find_attractors(const AttractorProblem& problem);
 
 } // namespace squeal

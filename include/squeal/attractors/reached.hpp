@@ -48,7 +48,7 @@ bool agree(const ReachedMotion& a, const ReachedMotion& b);
 
 /// Whether the motion is the cycle of this energy [J] and frequency [Hz]: a coordinate crosses zero a whole number of
 /// times a period.
-bool is_cycle(const ReachedMotion& motion, double energy, double frequency);
+bool is_cycle(const ReachedMotion& motion, const MeanValue& energy, const MeanValue& frequency);
 
 /// Joins motions of one kind that agree. Those that most starts lead to come first.
 std::vector<ReachedMotion> joined(std::vector<ReachedMotion> motions);

@@ -31,12 +31,15 @@ struct Estimate
   double reversal_amplitude = 0;   // [m] first q at which some pair's sliding along the drive stops; or infinite
   double damping_rate = 0;         // P_C/E [1/s], independent of q
   double friction_rate_linear = 0; // P_R/E as q -> 0 [1/s]; friction - damping = 2 Re(lambda)
-  double start_amplitude = 0; // [m] where vibrations start: the balance, or a multiple of first lift-off without one
+  double start_amplitude = 0; // [m] where vibrations start: the balance, or a multiple of the first event without one
   double phase = 0;           // [rad] turn of phi for which the smallest normal reaction at t = 0 is largest
   std::vector<double> curve_amplitude, curve_rate; // q [m] and P_R/E [1/s]
 };
 
-/// Start amplitude over first lift-off where there is no energy balance.
+/// [m] First lift-off or reversal of the sliding: below it a motion grows or decays as its mode does; or infinite.
+double first_event(const Estimate& estimate);
+
+/// Start amplitude over first lift-off, or over reversal where nothing lifts off, where there is no energy balance.
 inline constexpr double lift_off_multiple = 2;
 
 /// The phase is that of the amplitude found, or of first lift-off without balance. Collective. A mode without balance

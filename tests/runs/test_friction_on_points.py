@@ -1,0 +1,117 @@
+"""Frictional contact of few points, where right values come from closed forms, from trying every set of pairs or from events."""
+
+import numpy as np
+import pytest
+from models import write_scene
+
+
+def three_points(folder, masses, grounds, links, forces, contacts, **tables):
+    """Three points on springs (stiffness, damping, direction), each to ground or the next, and contacts (rotor, stator, normal,
+    tangent, velocity, gap); number 3 is the belt, which does not move."""
+    names = ["p0", "p1", "p2", "belt"]
+    points = [{"name": name, "at": [float(i), 0, 0], "mass": mass, "free": "x y z"} for i, (name, mass) in enumerate(zip(names, masses))]
+    points.append({"name": "belt", "at": [0, 0, 0], "free": "none"})
+    springs = [{"from": names[i // 3], "to": "ground", "stiffness": k, "damping": c, "direction": n} for i, (k, c, *n) in enumerate(grounds)]
+    springs += [{"from": names[i], "to": names[i + 1], "stiffness": k, "damping": c, "direction": n} for i, (k, c, *n) in enumerate(links)]
+    pairs = [{"rotor": names[a], "stator": names[b], "normal": n, "tangents": [t], "velocity": v, "gap": gap}
+             for a, b, n, t, v, gap in contacts]
+    return write_scene(folder, point=points, spring=springs, force=[{"on": name, "vector": f} for name, f in zip(names, forces)],
+                       contact=pairs, **tables)
+
+
+def test_an_equilibrium_is_found_where_sets_of_closed_pairs_repeat(squeal, tmp_path):
+    """Of all eight sets of closed pairs one alone fits. It goes on from the equilibria at less friction."""
+    scene = three_points(
+        tmp_path, [1.361253569439583, 1.6144517523450768, 1.339921780027303],
+        [[0.5290256669643174, 0.01, -0.919, 0.271, 0.285], [1.2231975292201813, 0.01, -0.157, -0.326, -0.932],
+         [3.9992014994761687, 0.01, -0.392, -0.886, 0.247], [1.909024575292212, 0.01, 0.33, -0.222, -0.917],
+         [3.733007067043935, 0.01, 0.847, 0.466, -0.256], [3.689548554519452, 0.01, 0.057, 0.446, 0.893],
+         [3.6549985455281213, 0.01, 0.003, -0.941, 0.339], [2.5643721810597224, 0.01, -0.396, -0.891, 0.221],
+         [2.157297925832175, 0.01, 0.975, 0.217, 0.051]],
+        [[1.77033699328646, 0.01, 0.293, -0.237, -0.926], [1.4343939475168315, 0.01, 0.2, -0.709, -0.676]],
+        [[1.5416736789077057, 0.9876670240142337, 1.996798222808113], [0.03531261741734174, -1.383490331390901, -1.5889567491243652],
+         [0.39720943759811883, 1.1251286166905132, 1.7428386443970412]],
+        [(3, 0, [-0.516, -0.323, -0.793], [0.49355820145920015, -0.8690188811315831, 0.032808406875856316],
+          [0.2931756704919611, -0.2224199846717785, -0.1001727502205138], 0.0),
+         (2, 1, [-0.195, 0.654, 0.731], [0.5653343055729145, -0.5340708957944954, 0.6286218268622685],
+          [0.34399960714938566, -0.324976171677824, 0.3825093565956595], 0.15641310866468955),
+         (3, 2, [-0.183, -0.444, -0.877], [0.22833112018236942, 0.848581347150029, -0.47725736958721376],
+          [0.30213286909416437, 1.1228619071699628, -0.6315176759722869], 0.0)],
+        friction={"coefficient": 0.6567735276216027}, modes={"band": 20.0}, estimate={"enabled": False})
+    equilibrium = squeal(scene, ranks=1).report["equilibrium"]
+    assert equilibrium["outcome"] == "converged" and equilibrium["closed"] == 2
+    assert equilibrium["normal_force_max"] == pytest.approx(5.799468, rel=1e-6)
+    assert equilibrium["normal_force_min"] == pytest.approx(0.484357, rel=1e-5)
+
+
+def test_a_mode_that_comes_back_through_infinity_has_a_threshold(squeal, tmp_path):
+    """At mu = 1.174663 the mass of sliding changes its sign (Painleve): an eigenvalue leaves through infinity and comes back as
+    a growth of any size, beyond the band."""
+    scene = three_points(
+        tmp_path, [1.3873821247749676, 0.554454731517144, 1.668441047721994],
+        [[1.6368268428571882, 0.001625918231319896, -0.028, -0.799, -0.601], [3.855215064346331, 0.01877417435135445, 0.042, -0.122, 0.992],
+         [1.1456648200532857, 0.0022573164879908527, -0.448, -0.696, -0.561], [1.7573670033515325, 0.0089320218897947, 0.042, 0.981, 0.187],
+         [3.1029272793317073, 0.010231482577600816, -0.446, 0.168, 0.879], [3.663991933219938, 0.012894075074503287, 0.14, -0.333, 0.933],
+         [1.209640779665062, 0.002782941731779085, -0.544, 0.809, 0.223], [3.381839110049579, 0.013857238304885212, 0.866, 0.398, 0.302],
+         [1.3933495329525627, 0.01709017399279786, -0.647, 0.042, 0.761]],
+        [[0.568361656350073, 0.002376472248909094, 0.755, -0.654, -0.047], [1.1902810563299766, 0.01104627021274609, 0.7, -0.195, -0.687]],
+        [[0.29943799561243684, 0.733924445382772, 1.7077699629816885], [-0.7734692529369284, -1.4735008556177247, 1.3726714806317273],
+         [0.6760939272588683, 0.2538325183284157, 0.15831102459277]],
+        [(1, 0, [-0.173, -0.483, -0.858], [0.22967587531216055, 0.8275282080534208, -0.512156236502105],
+          [-0.10962641361971119, 0.36757302153091365, -0.18481631683359123], 0.22395366981812204),
+         (3, 1, [0.433, 0.537, -0.724], [0.4322608360729341, -0.8285048609254995, -0.3559919451621723],
+          [0.2282296658150353, -0.43744279322879603, -0.18796040699717295], 0.1571056458212503)],
+        friction={"coefficient": 0.46666351384148935}, modes={"band": 20.0}, estimate={"enabled": False},
+        sweep={"key": "friction.coefficient", "from": 0.05, "to": 1.2, "points": 12})
+    sweep = squeal(scene, ranks=1).report["sweep"]
+    first, second = sweep["thresholds"]
+    assert first["values"][0] == pytest.approx(1.11753, abs=2e-5)
+    assert abs(second["values"][0] - 1.174663) <= second["error"] < 0.02 and second["change"] == 1
+
+
+def block_on_belt(folder, mass, stiffness, damping, load, speed, friction, **tables):
+    return write_scene(
+        folder, point=[{"name": "block", "at": [0, 0, 0], "mass": mass, "free": "x y"}, {"name": "belt", "at": [0, 0, 0], "free": "none"}],
+        spring=[{"from": "block", "direction": "x", "stiffness": stiffness, "damping": damping}],
+        force=[{"on": "block", "vector": [0, -load, 0]}],
+        contact=[{"rotor": "belt", "stator": "block", "normal": [0, 1, 0], "tangents": [[1, 0, 0]], "velocity": [speed, 0, 0]}],
+        friction=friction, probe=[{"name": "x", "on": "block", "direction": "x"}], **tables)
+
+
+def test_bars_of_the_motions_of_starts_hold_the_error_of_the_step(converged, tmp_path):
+    """Stick-slip of period 6.316306 s beside a stable equilibrium, by events. Half of the starts are large enough for it."""
+    scene = block_on_belt(tmp_path, 1.0, 1.0, 0.1, 1.0, 1.5, {"coefficient": 0.5, "static_coefficient": 1.0, "decay_speed": 0.5},
+                          modes={"band": 1.0}, cycle={"starts": 8})
+    report = converged(scene, ranks=1).report
+    kinds = {motion["kind"]: motion for motion in report["attractors"]["motions"]}
+    assert set(kinds) == {"rest", "steady"} and len(kinds["steady"]["starts"]) >= 3
+    assert abs(kinds["steady"]["frequency_hz"] - 0.1583204) <= kinds["steady"]["frequency_error"] < 2e-3
+    assert "starts lead to a motion at 0.158" in report["heard"]
+
+
+def test_friction_that_falls_within_a_step_is_no_motion_of_starts(squeal, tmp_path):
+    scene = block_on_belt(tmp_path, 0.538, 6957.0, 5.946, 10.0, 0.05, {"coefficient": 0.2, "static_coefficient": 0.6, "decay_speed": 1e-4},
+                          modes={"band": 100.0}, cycle={"starts": 8})
+    report = squeal(scene, ranks=1).report
+    assert report["attractors"]["outcome"] == "refused" and "several solutions" in report["attractors"]["reason"]
+
+
+def test_starts_beside_a_stable_equilibrium_are_large_enough_for_stick_slip(squeal, tmp_path):
+    """Any displacement above 1.1 V/omega leads to stick-slip at 16.50094 Hz, by events."""
+    scene = block_on_belt(tmp_path, 0.538, 6957.0, 5.946, 10.0, 0.05, {"coefficient": 0.2, "static_coefficient": 0.6, "decay_speed": 2e-3},
+                          modes={"band": 100.0}, cycle={"starts": 8, "steps_per_period": 256})
+    found = squeal(scene, ranks=1).report["attractors"]
+    steady = [motion for motion in found["motions"] if motion["kind"] == "steady"]
+    assert found["outcome"] == "completed" and len(steady) == 1 and len(steady[0]["starts"]) >= 4
+    assert abs(steady[0]["frequency_hz"] - 16.50094) <= steady[0]["frequency_error"]
+
+
+def test_nothing_is_said_of_a_mode_that_is_not_followed(converged, tmp_path):
+    """A box on a conveyor that turns round. It slips first at 4.602 s, by events: displacement 5.1 m at most."""
+    time = np.arange(0, 50.5, 0.5)
+    scene = block_on_belt(tmp_path, 20.0, 70.0, 10.0, 196.2, 3.0, {"coefficient": 1.5}, modes={"band": 10.0},
+                          transient={"start": "rest", "steps": 1000, "step_size": 0.05, "load_factor": [[0, 0], [0.01, 1]],
+                                     "speed_factor": [[t, s] for t, s in zip(time.tolist(), np.sin(2 * np.pi * time / 50).tolist())]})
+    run = converged(scene, ranks=1)
+    shown = run.printed[run.printed.index("  transient    completed"):]
+    assert "nan" not in run.printed and "predicted" not in shown and "periods" not in shown and "bias" not in shown
