@@ -161,24 +161,17 @@ Attractors find_attractors(const AttractorProblem& problem)
 {
   Attractors found;
   const int steps = problem.settings.steps_per_period;
-  found.outcome.reason = friction_refusal(problem.sliding, &problem.unstable.modes.front(), problem.settings.theta,
-                                          1 / (problem.unstable.modes.front().frequency_hz() * steps), problem.step, 1);
-  if (!found.outcome.reason.empty())
-  {
-    found.outcome.kind = OutcomeKind::refused;
-    return found;
-  }
+  const std::string refusal =
+      friction_refusal(problem.sliding, &problem.unstable.modes.front(), problem.settings.theta,
+                       1 / (problem.unstable.modes.front().frequency_hz() * steps), problem.step, 1);
+  if (!refusal.empty()) return {{OutcomeKind::refused, refusal, 0, 0}, {}, {}, 0};
   std::vector<State> states;
   for (NamedStart& start : make_starts(problem))
   {
     found.starts.push_back(start.name);
     states.push_back(std::move(start.state));
   }
-  if (states.empty())
-  {
-    found.outcome = {OutcomeKind::skipped, "no amplitude is known that contact limits", 0, 0};
-    return found;
-  }
+  if (states.empty()) return {{OutcomeKind::skipped, "no amplitude is known that contact limits", 0, 0}, {}, {}, 0};
   Swarm swarm(problem, steps, std::move(states));
   Progress progress(comm_of(problem.sliding.structure.load), "attractors", static_cast<double>(most_periods));
   std::vector<ReachedMotion> motions;

@@ -95,18 +95,6 @@ SplitSolution SplitSolver::solve(const std::vector<double>& rhs) const
 namespace
 {
 
-/// Pairs with a negative gap or reaction, rounding aside.
-std::vector<std::size_t> wrong_pairs(const SplitSolution& split, double compliance)
-{
-  double scale = 0;
-  for (std::size_t i = 0; i < split.gap.size(); ++i)
-    scale = std::max({scale, std::abs(split.gap[i]), compliance * std::abs(split.reaction[i])});
-  std::vector<std::size_t> wrong;
-  for (std::size_t i = 0; i < split.gap.size(); ++i)
-    if (std::min(split.gap[i], compliance * split.reaction[i]) < -sign_tolerance * scale) wrong.push_back(i);
-  return wrong;
-}
-
 /// The problem seen from a split: x are the gaps and scaled reactions that it leaves open, y those that it sets to
 /// zero, and z is added to all of x:
 ///     x = b + P y + z,   x, y >= 0,   x_i y_i = 0.
@@ -231,13 +219,19 @@ private:
   std::vector<Index> left_, right_;
 };
 
-/// The solution of a split; nothing where a sign is wrong or the split does not balance. `wrong`: pairs of wrong sign.
+/// The solution of a split; nothing where a sign is wrong or the split does not balance. `wrong`: pairs with a negative
+/// gap or reaction, rounding aside.
 std::optional<StatusSolution> solution_of(const ComplementarityProblem& problem, const std::vector<char>& closed,
                                           std::vector<std::size_t>& wrong)
 {
   auto solver = std::make_unique<SplitSolver>(problem, closed);
   SplitSolution split = solver->solve(problem.q);
-  wrong = wrong_pairs(split, problem.compliance);
+  double scale = 0;
+  for (std::size_t i = 0; i < closed.size(); ++i)
+    scale = std::max({scale, std::abs(split.gap[i]), problem.compliance * std::abs(split.reaction[i])});
+  wrong.clear();
+  for (std::size_t i = 0; i < closed.size(); ++i)
+    if (std::min(split.gap[i], problem.compliance * split.reaction[i]) < -sign_tolerance * scale) wrong.push_back(i);
   if (!wrong.empty() || split.defect > defect_tolerance) return std::nullopt;
   for (double& value : split.gap) value = std::max(0., value);
   for (double& value : split.reaction) value = std::max(0., value);
