@@ -1,7 +1,7 @@
 #include "squeal/algebra/bordered_factor.hpp"
 
 #include "cholesky.hpp"
-#include "mumps.hpp"
+#include "mumps_factor.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/free_memory.hpp"
 
@@ -14,11 +14,15 @@ namespace squeal
 struct Factor::Parts
 {
   MPI_Comm comm = MPI_COMM_NULL;
-  int border = 0;
-  std::optional<Cholesky> cholesky{}; // or
-  std::optional<BorderedMumps> mumps{};
+  int dofs = 0, border = 0;
+  RowLayout layout;                   // of the degrees of freedom
+  std::optional<Cholesky> cholesky{}; // takes and gives each rank's own rows; else
+  std::optional<MumpsFactor> mumps{}; // through rank 0
+  std::vector<double> right{};        // there: right-hand sides and then solutions, `dofs` long each
 
   bool on_rank_zero() const { return rank_of(comm) == 0; }
+  int own_rows() const { return layout.counts[static_cast<std::size_t>(rank_of(comm))]; }
+  double* column(std::size_t k) { return on_rank_zero() ? &right[k * static_cast<std::size_t>(dofs)] : nullptr; }
 };
 
 namespace
@@ -40,7 +44,7 @@ Triplets bordered(Mat A, Mat B)
   return entries;
 }
 
-/// A factorisation before it is made: its kind, entries and order.
+/// What will be factored, how and in which order.
 struct Plan
 {
   FactorKind kind;         // not automatic
@@ -54,7 +58,7 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
   const MPI_Comm comm = comm_of(A);
   Plan plan{options.kind, bordered(A, B), {}, 0};
   Triplets pattern;
-  if (ranks_of(comm) > 1) pattern = gather_pattern(plan.entries, comm);
+  if (ranks_of(comm) > 1) pattern = gather(plan.entries, TripletContent::pattern, comm);
   const Triplets& all = ranks_of(comm) > 1 ? pattern : plan.entries;
   plan.symbolic = options.known ? options.known->analyse(all, rows_of(A), rows_of(B), comm)
                                 : analyse(all, rows_of(A), rows_of(B), comm);
@@ -66,13 +70,13 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
   return plan;
 }
 
-/// Operations of a dense factor of n columns with this number of rows below them.
+/// Of a dense factor of n columns with so many rows below them.
 double operations_of(double columns, double below)
 {
   return columns * (columns * columns / 3 + columns * below + below * below);
 }
 
-/// Operations of all supernodes, or of a rank's share of them.
+/// Of the supernodes, and of a rank's share of them.
 double operations_of(const SymbolicFactor& symbolic)
 {
   double sum = 0;
@@ -135,12 +139,15 @@ Factor::Factor(Mat A, Mat B, const FactorOptions& options) : parts_(std::make_un
 {
   Parts& parts = *parts_;
   parts.comm = comm_of(A);
+  parts.layout = row_layout(A);
+  parts.dofs = parts.layout.total();
   parts.border = rows_of(B);
   Plan plan = make_plan(A, B, options);
   if (plan.kind == FactorKind::mumps)
-    parts.mumps.emplace(A, B);
+    parts.mumps.emplace(
+        BorderedEntries{std::move(plan.entries), plan.symbolic.position, parts.dofs, parts.border, parts.comm});
   else
-    parts.cholesky.emplace(std::move(plan.entries), std::move(plan.symbolic), row_layout(A), parts.comm);
+    parts.cholesky.emplace(std::move(plan.entries), std::move(plan.symbolic), parts.layout, parts.comm);
 }
 
 bool Factor::failed() const
@@ -150,25 +157,31 @@ bool Factor::failed() const
 
 std::vector<double> Factor::condensed(double scale) const
 {
-  const auto n = static_cast<std::size_t>(parts_->on_rank_zero() ? parts_->border : 0);
-  std::vector<double> result = vector_on_large_pages(n * n);
-  result.resize(n * n);
-  read_condensed(
-      [&](const CondensedStrip& strip)
-      {
-        for (std::size_t j = strip.first; j < strip.last; ++j)
-          std::copy_n(strip.values + (j - strip.first) * strip.height, strip.height, &result[j * n + strip.first]);
-      });
+  std::vector<double> result;
+  if (const auto products = condensed_products())
+  {
+    const auto n = static_cast<std::size_t>(parts_->on_rank_zero() ? parts_->border : 0);
+    result = vector_on_large_pages(n * n);
+    result.resize(n * n);
+    products->read(
+        [&](const CondensedStrip& strip)
+        {
+          for (std::size_t j = strip.first; j < strip.last; ++j)
+            std::copy_n(strip.values + (j - strip.first) * strip.height, strip.height, &result[j * n + strip.first]);
+        });
+  }
+  else
+    result = parts_->mumps->take_schur_complement();
   if (parts_->on_rank_zero()) scale_and_mirror(result, parts_->border, scale);
   return result;
 }
 
 void Factor::read_condensed(const std::function<void(const CondensedStrip&)>& take) const
 {
-  if (const auto products = condensed_products())
-    products->read(take);
-  else
-    parts_->mumps->read_condensed(take);
+  if (const auto products = condensed_products()) return products->read(take);
+  const std::vector<double> whole = parts_->mumps->take_schur_complement();
+  const auto n = static_cast<std::size_t>(parts_->border);
+  if (parts_->on_rank_zero()) take({0, n, n, whole.data()});
 }
 
 std::optional<CondensedProducts> Factor::condensed_products() const
@@ -211,20 +224,38 @@ void CondensedProducts::read(const std::function<void(const CondensedStrip&)>& t
 
 std::vector<double> Factor::forward(std::span<const Vec> b) const
 {
-  if (parts_->mumps) return parts_->mumps->forward(b);
+  Parts& parts = *parts_;
   std::vector<const double*> own(b.size());
   for (std::size_t k = 0; k < b.size(); ++k) check(VecGetArrayRead(b[k], &own[k]));
-  std::vector<double> result = parts_->cholesky->forward(own);
+  std::vector<double> result;
+  if (parts.cholesky)
+    result = parts.cholesky->forward(own);
+  else
+  {
+    if (parts.on_rank_zero()) parts.right.resize(b.size() * static_cast<std::size_t>(parts.dofs));
+    for (std::size_t k = 0; k < b.size(); ++k)
+      MPI_Gatherv(own[k], parts.own_rows(), MPI_DOUBLE, parts.column(k), parts.layout.counts.data(),
+                  parts.layout.starts.data(), MPI_DOUBLE, 0, parts.comm);
+    result = parts.mumps->forward(parts.right, to_int(b.size()));
+  }
   for (std::size_t k = 0; k < b.size(); ++k) check(VecRestoreArrayRead(b[k], &own[k]));
   return result;
 }
 
 void Factor::backward(const std::vector<double>& lambda, std::span<const Vec> x) const
 {
-  if (parts_->mumps) return parts_->mumps->backward(lambda, x);
+  Parts& parts = *parts_;
   std::vector<double*> own(x.size());
   for (std::size_t k = 0; k < x.size(); ++k) check(VecGetArrayWrite(x[k], &own[k]));
-  parts_->cholesky->backward(lambda, own);
+  if (parts.cholesky)
+    parts.cholesky->backward(lambda, own);
+  else
+  {
+    parts.mumps->backward(lambda, parts.right);
+    for (std::size_t k = 0; k < x.size(); ++k)
+      MPI_Scatterv(parts.column(k), parts.layout.counts.data(), parts.layout.starts.data(), MPI_DOUBLE, own[k],
+                   parts.own_rows(), MPI_DOUBLE, 0, parts.comm);
+  }
   for (std::size_t k = 0; k < x.size(); ++k) check(VecRestoreArrayWrite(x[k], &own[k]));
 }
 
@@ -240,6 +271,7 @@ std::shared_ptr<KnownAnalyses> no_analyses()
 
 FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options)
 {
+  const int dofs = rows_of(A), border = rows_of(B);
   const MPI_Comm comm = comm_of(A);
   Plan plan = make_plan(A, B, options);
   FactorForecast forecast = multifrontal_forecast(plan.symbolic);
@@ -250,7 +282,7 @@ FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options)
     forecast.border_entries = 0;
     forecast.operations = operations_of(plan.symbolic) / ranks_of(comm);
     MPI_Bcast(&forecast.operations, 1, MPI_DOUBLE, 0, comm);
-    forecast.bytes = MumpsFactor(A, definite_settings()).estimated_memory();
+    forecast.bytes = mumps_factor_memory({std::move(plan.entries), plan.symbolic.position, dofs, border, comm});
   }
   else
   {

@@ -10,7 +10,7 @@ namespace squeal
 
 using Eigen::MatrixXd;
 
-Owned<Mat> whole_copy(Mat A)
+MatrixXd dense_copy(Mat A)
 {
   PetscInt rows = 0, columns = 0;
   check(MatGetSize(A, &rows, &columns));
@@ -20,23 +20,13 @@ Owned<Mat> whole_copy(Mat A)
   const IS row_set = all_rows, column_set = all_columns;
   Mat* parts = nullptr;
   check(MatCreateSubMatrices(A, 1, &row_set, &column_set, MAT_INITIAL_MATRIX, &parts));
-  Owned<Mat> result;
-  check(MatConvert(parts[0], MATSEQAIJ, MAT_INITIAL_MATRIX, result.put()));
-  check(MatDestroySubMatrices(1, &parts));
-  return result;
-}
-
-MatrixXd dense_copy(Mat A)
-{
-  const Owned<Mat> whole = whole_copy(A);
-  PetscInt rows = 0, columns = 0;
-  check(MatGetSize(A, &rows, &columns));
   MatrixXd result = MatrixXd::Zero(rows, columns);
-  for_each_row(whole,
+  for_each_row(parts[0],
                [&](PetscInt i, std::span<const PetscInt> column, std::span<const PetscScalar> value)
                {
                  for (std::size_t k = 0; k < column.size(); ++k) result(i, column[k]) = value[k];
                });
+  check(MatDestroySubMatrices(1, &parts));
   return result;
 }
 

@@ -1,9 +1,14 @@
 #include "mumps.hpp"
 
-#include "squeal/base/broadcast.hpp"
 #include "squeal/base/free_memory.hpp"
+#include "squeal/base/petsc.hpp"
 
 #include <algorithm>
+#include <array>
+#include <iterator>
+#include <string>
+#include <type_traits>
+#include <utility>
 
 namespace squeal
 {
@@ -11,175 +16,105 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-
-// Controls, and INFOG(1).
-constexpr PetscInt transposition = 9, room = 14;
-constexpr PetscInt singular = -10, out_of_memory = -13;
-constexpr PetscInt largest_room = 2000; // [%]
+constexpr int singular = -10;          // INFOG(1)
+constexpr int out_of_memory = -13;     // INFOG(1)
+constexpr int largest_increase = 2000; // [%] beyond MUMPS's estimate of its memory
 
 /// Whether INFOG(1) says that delayed pivots or messages between ranks need more memory than was estimated.
-bool exceeds_estimate(PetscInt outcome)
+bool exceeds_estimate(int outcome)
 {
   return outcome == -8 || outcome == -9 || outcome == -17 || outcome == -20;
 }
 
-/// This rank's rows as a matrix of PETSc's, which borrows them.
-Owned<Mat> borrowed(const MatrixXd& rows, MPI_Comm comm)
+/// The same numbers as MUMPS's integers, which may have 64 bits.
+template <class Integer> std::vector<MUMPS_INT> converted(std::vector<Integer> numbers)
 {
-  Owned<Mat> result;
-  check(MatCreateDense(comm, static_cast<PetscInt>(rows.rows()), PETSC_DECIDE, PETSC_DETERMINE,
-                       static_cast<PetscInt>(rows.cols()), const_cast<double*>(rows.data()), result.put()));
-  return result;
+  if constexpr (std::is_same_v<MUMPS_INT, Integer>)
+    return numbers;
+  else
+    return {numbers.begin(), numbers.end()};
+}
+
+/// INFOG(1) after the job.
+int outcome_of(DMUMPS_STRUC_C& mumps, MumpsJob job)
+{
+  mumps.job = static_cast<MUMPS_INT>(job);
+  dmumps_c(&mumps);
+  return information(mumps, 1);
+}
+
+[[noreturn]] void throw_failure(const DMUMPS_STRUC_C& mumps)
+{
+  if (information(mumps, 1) == out_of_memory) throw LibraryError(out_of_memory_text);
+  throw LibraryError("MUMPS, job " + std::to_string(mumps.job) +
+                     ": INFOG(1) = " + std::to_string(information(mumps, 1)) +
+                     ", INFOG(2) = " + std::to_string(information(mumps, 2)) + "; its manual lists them");
 }
 
 } // namespace
 
-MumpsFactor::MumpsFactor(Mat A, const MumpsSettings& settings) : A_(A), settings_(settings)
+void EndMumps::operator()(DMUMPS_STRUC_C* mumps) const
 {
-  analyse();
-}
-
-MumpsFactor::~MumpsFactor()
-{
-  factor_ = {};
+  outcome_of(*mumps, MumpsJob::end);
+  delete mumps;
   return_freed_memory();
 }
 
-PetscInt MumpsFactor::information(PetscInt number) const
+Mumps start_mumps(MPI_Comm comm, MumpsSymmetry symmetry)
 {
-  PetscInt value = 0;
-  check(MatMumpsGetInfog(factor_, number, &value));
-  return value;
+  Mumps mumps(new DMUMPS_STRUC_C{});
+  mumps->par = 1;
+  mumps->sym = static_cast<MUMPS_INT>(symmetry);
+  mumps->comm_fortran = static_cast<MUMPS_INT>(MPI_Comm_c2f(comm));
+  run(*mumps, MumpsJob::start);
+  for (const int stream : {1, 2, 3}) control(*mumps, stream) = -1;
+  control(*mumps, 4) = 0;  // no output
+  control(*mumps, 7) = 1;  // the order of elimination is given
+  control(*mumps, 13) = 1; // no ScaLAPACK, since negative pivots of a root that it factors are not counted
+  control(*mumps, 18) = 3; // every rank gives its share of the entries
+  return mumps;
 }
 
-void MumpsFactor::analyse()
+void set_controls_from_options(DMUMPS_STRUC_C& mumps, const char* prefix)
 {
-  const bool symmetric = settings_.symmetry == Symmetry::symmetric;
-  check(MatGetFactor(A_, MATSOLVERMUMPS, symmetric ? MAT_FACTOR_CHOLESKY : MAT_FACTOR_LU, factor_.put()));
-  check(MatSetOptionsPrefix(factor_, settings_.prefix));
-  // rows stay where they are
-  check(MatMumpsSetIcntl(factor_, 6, 0));
-  // METIS; on one rank PETSc leaves the order to MUMPS
-  check(MatMumpsSetIcntl(factor_, 7, 5));
-  // no ScaLAPACK, since negative pivots of a root that it factors are not counted
-  check(MatMumpsSetIcntl(factor_, 13, 1));
-  check(MatMumpsSetIcntl(factor_, room, settings_.room));
-  check(MatMumpsSetCntl(factor_, 1, settings_.pivoting));
-  MatFactorInfo info;
-  check(MatFactorInfoInitialize(&info));
-  check(symmetric ? MatCholeskyFactorSymbolic(factor_, A_, nullptr, &info)
-                  : MatLUFactorSymbolic(factor_, A_, nullptr, nullptr, &info));
-}
-
-bool MumpsFactor::factorise()
-{
-  MatFactorInfo info;
-  check(MatFactorInfoInitialize(&info));
-  while (true)
+  constexpr std::array own = {5, 9, 13, 18, 19, 20, 21, 26, 27};
+  for (int number = 1; number <= static_cast<int>(std::size(mumps.icntl)); ++number)
   {
-    check(settings_.symmetry == Symmetry::symmetric ? MatCholeskyFactorNumeric(factor_, A_, &info)
-                                                    : MatLUFactorNumeric(factor_, A_, &info));
-    const PetscInt outcome = information(1), detail = information(2);
-    if (outcome >= 0) return true;
-    PetscInt given = 0;
-    check(MatMumpsGetIcntl(factor_, room, &given));
-    if (outcome == out_of_memory) throw LibraryError(out_of_memory_text);
-    if (outcome != singular && !(exceeds_estimate(outcome) && given < largest_room))
-      throw LibraryError("MUMPS: INFOG(1) = " + std::to_string(outcome) + ", INFOG(2) = " + std::to_string(detail) +
-                         "; its manual lists them");
-    analyse(); // PETSc leaves a factor as it is after one that failed
-    if (outcome == singular) return false;
-    check(MatMumpsSetIcntl(factor_, room, 4 * std::max<PetscInt>(given, 0) + 10));
+    if (std::ranges::find(own, number) != own.end()) continue;
+    auto value = static_cast<PetscInt>(control(mumps, number));
+    check(PetscOptionsGetInt(nullptr, prefix, format("-mat_mumps_icntl_%d", number).c_str(), &value, nullptr));
+    control(mumps, number) = static_cast<MUMPS_INT>(value);
   }
+  for (std::size_t number = 1; number <= std::size(mumps.cntl); ++number)
+    check(PetscOptionsGetReal(nullptr, prefix, format("-mat_mumps_cntl_%zu", number).c_str(), &mumps.cntl[number - 1],
+                              nullptr));
 }
 
-MatrixXd MumpsFactor::solve(const MatrixXd& B) const
+void run(DMUMPS_STRUC_C& mumps, MumpsJob job)
 {
-  MatrixXd X(B.rows(), B.cols());
-  const Owned<Mat> right = borrowed(B, comm_of(A_)), solution = borrowed(X, comm_of(A_));
-  check(MatMatSolve(factor_, right, solution));
-  return X;
+  if (outcome_of(mumps, job) < 0) throw_failure(mumps);
 }
 
-MatrixXd MumpsFactor::solve_transposed(const MatrixXd& B) const
+void set_entries(Mumps& mumps, Triplets& entries, int size)
 {
-  check(MatMumpsSetIcntl(factor_, transposition, 0));
-  MatrixXd X = solve(B);
-  check(MatMumpsSetIcntl(factor_, transposition, 1));
-  return X;
+  EndMumps& places = mumps.get_deleter();
+  places.row = converted(std::move(entries.row));
+  places.column = converted(std::move(entries.column));
+  mumps->n = size;
+  mumps->nnz_loc = static_cast<MUMPS_INT8>(entries.value.size());
+  mumps->irn_loc = places.row.data();
+  mumps->jcn_loc = places.column.data();
+  mumps->a_loc = entries.value.data();
 }
 
-double MumpsFactor::count(PetscInt number) const
+bool factorise(DMUMPS_STRUC_C& mumps)
 {
-  const auto value = static_cast<double>(information(number)); // a negative one counts millions
-  return value < 0 ? -1e6 * value : value;
-}
-
-double MumpsFactor::estimated_memory() const
-{
-  constexpr double megabyte = 1e6; // MUMPS gives whole ones
-  return std::max(megabyte * static_cast<double>(information(17)), sizeof(double) * count(20));
-}
-
-MumpsSettings definite_settings()
-{
-  // without pivoting the estimate of the memory is close
-  return {.symmetry = Symmetry::symmetric, .prefix = "factor_", .room = 1, .pivoting = 0};
-}
-
-BorderedMumps::BorderedMumps(Mat A, Mat B)
-    : B_(shared(B)), transposed_(B ? transpose_of(B) : Owned<Mat>()), factor_(A, definite_settings()),
-      failed_(!factor_.factorise() || factor_.negative_pivots() > 0)
-{
-}
-
-void BorderedMumps::read_condensed(const std::function<void(const CondensedStrip&)>& take) const
-{
-  if (!B_) return;
-  constexpr PetscInt width = 96; // columns at once, as many vectors of the matrix's size
-  PetscInt size = 0, first = 0, last = 0;
-  check(MatGetSize(B_, &size, nullptr));
-  check(MatGetOwnershipRange(B_, &first, &last));
-  const MPI_Comm comm = comm_of(B_);
-  for (PetscInt begin = 0; begin < size; begin += width)
-  {
-    const PetscInt columns = std::min(width, size - begin);
-    const MatrixXd units = MatrixXd::NullaryExpr(last - first, columns,
-                                                 [&](Index i, Index j) { return first + i == begin + j ? 1. : 0.; });
-    const MultiVector rows = product(transposed_, {comm, units});
-    const MatrixXd strip = whole_product(B_, {comm, factor_.solve(rows.entries)}).bottomRows(size - begin);
-    const auto from = static_cast<std::size_t>(begin);
-    if (rank_of(comm) == 0)
-      take({from, from + static_cast<std::size_t>(columns), static_cast<std::size_t>(size - begin), strip.data()});
-  }
-}
-
-std::vector<double> BorderedMumps::forward(std::span<const Vec> b)
-{
-  solution_ = columns_of(b);
-  solution_.entries = factor_.solve(solution_.entries);
-  if (!B_) return {};
-  const MatrixXd seen = whole_product(B_, solution_);
-  return rank_of(solution_.comm) == 0 ? std::vector<double>(seen.data(), seen.data() + seen.size())
-                                      : std::vector<double>();
-}
-
-void BorderedMumps::backward(const std::vector<double>& lambda, std::span<const Vec> x) const
-{
-  MultiVector result = solution_;
-  if (B_)
-  {
-    PetscInt size = 0, first = 0, last = 0;
-    check(MatGetSize(B_, &size, nullptr));
-    check(MatGetOwnershipRange(B_, &first, &last));
-    std::vector<double> forces = lambda;
-    broadcast(forces, solution_.comm);
-    const MatrixXd own = MatrixXd::Map(forces.data(), size, solution_.columns()).middleRows(first, last - first);
-    result.entries -= factor_.solve(product(transposed_, {solution_.comm, own}).entries);
-  }
-  for (std::size_t k = 0; k < x.size(); ++k) copy_column(result, static_cast<Index>(k), x[k]);
+  int outcome = outcome_of(mumps, MumpsJob::factorise);
+  for (MUMPS_INT& increase = control(mumps, 14); exceeds_estimate(outcome) && increase < largest_increase;
+       outcome = outcome_of(mumps, MumpsJob::factorise))
+    increase = 4 * std::max<MUMPS_INT>(increase, 0) + 10;
+  if (outcome < 0 && outcome != singular) throw_failure(mumps);
+  return outcome != singular;
 }
 
 } // namespace squeal

@@ -1,85 +1,75 @@
 #pragma once
-/// MUMPS (Amestoy, Duff, L'Excellent, Koster 2001) through PETSc: the factor of a sparse matrix over its ranks, and
-/// such a factor of a positive definite A with a border of rows B beside it. MUMPS's INFOG is the same on all ranks, so
+/// The interface to MUMPS (Amestoy, Duff, L'Excellent, Koster 2001): one factor over all ranks, in a given order of
+/// elimination, from entries that are distributed. Every call is collective. MUMPS's INFOG is the same on all ranks, so
 /// that its errors are thrown on all ranks together.
-#include "squeal/algebra/pencil_factor.hpp"
+#include "triplets.hpp"
+
+#include <dmumps_c.h>
+#include <memory>
 
 namespace squeal
 {
 
-struct MumpsSettings
+/// Ends an instance, and holds the places of its entries in MUMPS's own integers.
+struct EndMumps
 {
-  Symmetry symmetry = Symmetry::none;
-  const char* prefix = ""; // of the options that MUMPS takes; they come before the settings
-  PetscInt room = 30;      // [%] memory beyond MUMPS's estimate to start with
-  double pivoting = 0.01;  // CNTL(1): the least pivot over the largest entry of its column; 0: all are taken
+  std::vector<MUMPS_INT> row, column;
+
+  void operator()(DMUMPS_STRUC_C* mumps) const;
 };
 
-/// A factor whose members are collective.
-class MumpsFactor
+using Mumps = std::unique_ptr<DMUMPS_STRUC_C, EndMumps>;
+
+enum class MumpsJob
 {
-public:
-  /// Analyses the pattern of A, which is borrowed. Throws LibraryError if memory runs out.
-  MumpsFactor(Mat A, const MumpsSettings& settings);
-  ~MumpsFactor();
-
-  /// Factors A as it is now, with more memory where the estimate was too small. Returns false if A is singular. Throws
-  /// LibraryError for any other failure.
-  bool factorise();
-
-  /// INFOG(12) of the last factorisation. For Symmetry::symmetric only.
-  int negative_pivots() const { return to_int(information(12)); }
-
-  /// A^-1 B and A'^-1 B for this rank's rows of both.
-  Eigen::MatrixXd solve(const Eigen::MatrixXd& B) const;
-  Eigen::MatrixXd solve_transposed(const Eigen::MatrixXd& B) const;
-
-  /// Entries of the factor, on all ranks together.
-  double entries() const { return count(29); }
-
-  /// Memory that the factor takes by the analysis, on all ranks together [bytes].
-  double estimated_memory() const;
-
-private:
-  void analyse();
-  PetscInt information(PetscInt number) const; // INFOG
-  double count(PetscInt number) const;         // the same of large numbers
-
-  Mat A_;
-  MumpsSettings settings_;
-  Owned<Mat> factor_;
+  start = -1,
+  end = -2,
+  analyse = 1,
+  factorise = 2,
+  solve = 3,
 };
 
-/// The factor of a positive definite A by MUMPS and the border's rows B. Parts of B A^-1 B' come from solves with rows
-/// of B. It has the two halves of a solve of the supernodal factor (cholesky.hpp); each is a whole solve.
-class BorderedMumps
+/// Parameter SYM of MUMPS. Its value 1, for positive definite matrices, is not used: negative pivots are not counted.
+enum class MumpsSymmetry
 {
-public:
-  /// B may be null.
-  BorderedMumps(Mat A, Mat B);
-
-  /// Whether A is not positive definite; the factor is then not to be used.
-  bool failed() const { return failed_; }
-
-  /// Gives B A^-1 B' to `take` on rank 0, strip after strip.
-  void read_condensed(const std::function<void(const CondensedStrip&)>& take) const;
-
-  /// B A^-1 b for each b, on rank 0; keeps A^-1 b.
-  std::vector<double> forward(std::span<const Vec> b);
-
-  /// A^-1 (b - B' lambda) into x; lambda is read on rank 0.
-  void backward(const std::vector<double>& lambda, std::span<const Vec> x) const;
-
-  double entries() const { return factor_.entries(); }
-
-private:
-  Owned<Mat> B_, transposed_;
-  MumpsFactor factor_;
-  MultiVector solution_{};
-  bool failed_;
+  none = 0,      // L U
+  symmetric = 2, // L D L', with the number of negative pivots
 };
 
-/// The settings for a positive definite matrix.
-MumpsSettings definite_settings();
+/// An instance without output.
+Mumps start_mumps(MPI_Comm comm, MumpsSymmetry symmetry);
+
+/// Sets the controls that the options -<prefix>mat_mumps_icntl_N and -<prefix>mat_mumps_cntl_N give. Those of the
+/// matrix's format, of the counted pivots and of single solves are the program's own and not asked for.
+void set_controls_from_options(DMUMPS_STRUC_C& mumps, const char* prefix);
+
+/// ICNTL(number), counted from one as in MUMPS's manual.
+inline MUMPS_INT& control(DMUMPS_STRUC_C& mumps, int number)
+{
+  return mumps.icntl[number - 1];
+}
+
+/// INFOG(number), counted from one as in MUMPS's manual.
+inline MUMPS_INT information(const DMUMPS_STRUC_C& mumps, int number)
+{
+  return mumps.infog[number - 1];
+}
+
+/// INFOG(12), of the last factorisation.
+inline int number_of_negative_pivots(const DMUMPS_STRUC_C& mumps)
+{
+  return information(mumps, 12);
+}
+
+/// Throws LibraryError if the job fails.
+void run(DMUMPS_STRUC_C& mumps, MumpsJob job);
+
+/// Sets the matrix of `size` rows. Moves rows and columns of the entries out; MUMPS borrows their values until the last
+/// factorisation.
+void set_entries(Mumps& mumps, Triplets& entries, int size);
+
+/// Factorises, and again with more memory beyond MUMPS's estimate, ICNTL(14), where that was too little. Returns false
+/// if the matrix is singular; throws LibraryError for any other failure.
+bool factorise(DMUMPS_STRUC_C& mumps);
 
 } // namespace squeal

@@ -135,9 +135,10 @@ void use_mumps(ST transformation)
   check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
 }
 
-ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options)
+ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options,
+                              const EliminationOrder* order)
 {
-  return {K, M, 0, std::make_unique<PencilFactor>(K, M, symmetry, options)};
+  return {K, M, 0, std::make_unique<PencilFactor>(K, M, symmetry, options, order)};
 }
 
 void move_to(ShiftInvert& pencil, double shift)

@@ -35,14 +35,14 @@ template <class Keep> void append(Mat matrix, PetscInt offset, Keep keep, double
                });
 }
 
-std::vector<int> gather(const std::vector<int>& own, MPI_Comm comm)
+template <class T> std::vector<T> gather(const std::vector<T>& own, MPI_Datatype type, MPI_Comm comm)
 {
   const int count = to_int(own.size());
   std::vector<int> counts(static_cast<std::size_t>(ranks_of(comm))), starts(counts.size(), 0);
   MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, comm);
   for (std::size_t p = 1; p < counts.size(); ++p) starts[p] = starts[p - 1] + counts[p - 1];
-  std::vector<int> all(rank_of(comm) == 0 ? static_cast<std::size_t>(starts.back() + counts.back()) : 0);
-  MPI_Gatherv(own.data(), count, MPI_INT, all.data(), counts.data(), starts.data(), MPI_INT, 0, comm);
+  std::vector<T> all(rank_of(comm) == 0 ? static_cast<std::size_t>(starts.back() + counts.back()) : 0);
+  MPI_Gatherv(own.data(), count, type, all.data(), counts.data(), starts.data(), type, 0, comm);
   return all;
 }
 
@@ -63,12 +63,15 @@ void append_rows(Mat B, PetscInt offset, Triplets& entries)
       B, offset, [](PetscInt, PetscInt) { return true; }, 1, entries);
 }
 
-Triplets gather_pattern(const Triplets& entries, MPI_Comm comm)
+Triplets gather(Triplets entries, TripletContent content, MPI_Comm comm)
 {
+  if (ranks_of(comm) == 1) return entries;
   auto total = static_cast<long long>(entries.row.size());
   MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPI_LONG_LONG, MPI_SUM, comm);
   (void)to_int(total);
-  return {gather(entries.row, comm), gather(entries.column, comm), {}};
+  Triplets all{gather(entries.row, MPI_INT, comm), gather(entries.column, MPI_INT, comm), {}};
+  if (content == TripletContent::values) all.value = gather(entries.value, MPI_DOUBLE, comm);
+  return all;
 }
 
 } // namespace squeal

@@ -14,14 +14,21 @@ struct Triplets
   std::vector<double> value;
 };
 
+/// What a gather communicates.
+enum class TripletContent
+{
+  pattern, // rows and columns only
+  values,  // all three
+};
+
 /// This rank's share of the lower triangle, diagonal included.
 Triplets lower_triangle(Mat symmetric);
 
 /// Appends this rank's rows of B; its first row becomes row `offset` + 1.
 void append_rows(Mat B, PetscInt offset, Triplets& entries);
 
-/// Rows and columns of the entries of all ranks on rank 0, none elsewhere. Collective. Throws Error on all ranks if
-/// there are more than MPI can gather.
-Triplets gather_pattern(const Triplets& entries, MPI_Comm comm);
+/// The entries of all ranks on rank 0, none elsewhere. Collective. Throws Error on all ranks if there are more than
+/// MPI can gather.
+Triplets gather(Triplets entries, TripletContent content, MPI_Comm comm);
 
 } // namespace squeal

@@ -93,7 +93,8 @@ Inertia inertia_at(double limit, ShiftInvert& pencil)
 
 ShiftInvert& pencil_of(RealCount& count)
 {
-  if (!count.pencil.factor) count.pencil = make_shift_invert(count.K, count.M, Symmetry::symmetric, count.options);
+  if (!count.pencil.factor)
+    count.pencil = make_shift_invert(count.K, count.M, Symmetry::symmetric, count.options, &order_of(count));
   return count.pencil;
 }
 
@@ -222,6 +223,12 @@ int count_below(RealCount& count, double omega)
   const auto [known, is_new] = count.below.try_emplace(omega);
   if (!is_new) return known->second;
   return known->second = inertia_at(omega * omega, pencil_of(count)).below;
+}
+
+const EliminationOrder& order_of(RealCount& count)
+{
+  if (count.order.position.empty()) count.order = elimination_order(count.K);
+  return count.order;
 }
 
 void free_factor(RealCount& count)

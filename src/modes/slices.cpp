@@ -119,7 +119,7 @@ CountedSolution solve_by_slices(const QuadraticProblem& problem, RealCount& real
   const auto search = [&](bool again)
   {
     Progress progress(comm_of(problem.K), again ? "modes again" : "modes", all);
-    ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options);
+    ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::none, options, &order_of(real));
     bool rigid = false; // a body may be free
     std::vector<double> moduli;
     for (Slice& slice : slices)

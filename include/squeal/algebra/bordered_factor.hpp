@@ -24,7 +24,7 @@ enum class FactorKind
 {
   automatic,  // supernodal, or mumps where FactorOptions::limit says so
   supernodal, // L L' by supernodes in METIS's ordering, subtrees by ranks; the fastest
-  mumps,      // MUMPS, spread over all ranks, with two solves where the other has two halves of one
+  mumps,      // MUMPS in the same ordering, spread over all ranks
 };
 
 template <> inline constexpr std::array words_of<FactorKind> = {"automatic", "supernodal", "mumps"};
@@ -35,7 +35,7 @@ class KnownAnalyses;
 /// One that knows none yet.
 std::shared_ptr<KnownAnalyses> no_analyses();
 
-/// Options of every stage that factors a symmetric positive definite matrix.
+/// Of every stage that factors a symmetric positive definite matrix.
 struct FactorOptions
 {
   FactorKind kind = FactorKind::automatic;
@@ -73,13 +73,14 @@ public:
   /// Whether a pivot was zero or negative: A is not positive definite, and the factor is not to be used.
   bool failed() const;
 
-  /// scale B A^-1 B', row-major, symmetric to the last bit; on rank 0 only, empty elsewhere.
+  /// scale B A^-1 B', row-major, symmetric to the last bit; on rank 0 only, empty elsewhere. MUMPS's factor
+  /// moves its storage out: call it once, or read the strips once.
   std::vector<double> condensed(double scale) const;
 
   /// Gives B A^-1 B' to `take` on rank 0, strip after strip.
   void read_condensed(const std::function<void(const CondensedStrip&)>& take) const;
 
-  /// B A^-1 B' without storing it; nothing of MUMPS, whose products would be solves.
+  /// B A^-1 B' without storing it; nothing of MUMPS, which has stored it already.
   std::optional<CondensedProducts> condensed_products() const;
 
   /// B A^-1 b for each b, one after the other; on rank 0 only. `backward` must follow before the next `forward`.
@@ -138,7 +139,7 @@ struct FactorForecast
   double operations = 0;                   // to make a Factor, on the rank that has most to do
 };
 
-/// Forecasts a Factor of A and B, and MUMPS's factors of A as if in the same order. B may be null. Collective.
+/// Forecasts a Factor of A and B, and MUMPS's factors of A in the same order. B may be null. Collective.
 FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options);
 
 /// x = A^-1 b. The factor has no border. Collective.

@@ -7,9 +7,6 @@
 namespace squeal
 {
 
-/// A on every rank, by sparse rows. Collective.
-Owned<Mat> whole_copy(Mat A);
-
 /// All entries of A on every rank. Collective.
 Eigen::MatrixXd dense_copy(Mat A);
 
@@ -34,7 +31,7 @@ Share share_of(Eigen::Index count, MPI_Comm comm);
 /// Gives every rank the entries that the others computed of `count` ones of `length` numbers each, one after the other.
 /// Collective.
 void gather_shares(double* values, Eigen::Index count, Eigen::Index length, MPI_Comm comm);
-/// Gives every rank the columns that the others computed. Collective.
+/// The same of columns. Collective.
 void gather_columns(Eigen::MatrixXd& A, MPI_Comm comm);
 
 /// A x by two real products, which BLAS does: of a real with a complex matrix Eigen makes a slow loop of its own.
@@ -51,7 +48,7 @@ Eigen::MatrixXd parts_of(const Eigen::MatrixXcd& x);
 
 /// A^-1 B by LU with row interchanges. Throws Error with the text `singular` if a pivot is zero.
 Eigen::MatrixXd solve_dense(Eigen::MatrixXd A, const Eigen::MatrixXd& B, const char* singular);
-/// Puts A^-1 B in the place of B.
+/// The same in the place of B.
 void solve_dense_in_place(Eigen::MatrixXd A, Eigen::Ref<Eigen::MatrixXd> B, const char* singular);
 
 /// An orthonormal basis of the span of independent columns.

@@ -1,9 +1,11 @@
 #pragma once
-/// The factor of K - shift M by MUMPS (src/README.md, section 8.6).
+/// The factor of K - shift M by MUMPS, with METIS's nested dissection (src/README.md, section 8.6). It takes MUMPS's
+/// own interface, since PETSc's has no way to pass an order of elimination.
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/algebra/multivector.hpp"
 
 #include <memory>
+#include <vector>
 
 namespace squeal
 {
@@ -18,15 +20,27 @@ enum class Symmetry
 /// Options of all factors by MUMPS of the modes.
 struct PencilOptions
 {
-  PetscInt room = 30;        // [%] memory beyond MUMPS's estimate to start with; it grows where that is too little
-  double whole_limit = 0.05; // [GB] of a K whose factor every rank makes whole
+  PetscInt room = 30;       // [%] memory beyond MUMPS's estimate to start with; it grows where that is too little
+  double whole_limit = 0.2; // [GB] of a factor that every rank makes whole
 };
 
-/// The order of elimination is found once and serves every shift. Members are collective, but for negative_pivots.
+/// A nested dissection, on every rank. It serves every matrix of nearly the same pattern.
+struct EliminationOrder
+{
+  std::vector<int> position; // of each degree of freedom, counted from one as MUMPS does
+  double entries = 0;        // of a symmetric factor
+};
+
+/// By the lower triangle of K. Collective.
+EliminationOrder elimination_order(Mat K);
+
+/// The order of elimination is found once and serves every shift. Borrows K and M. Members are collective, but for
+/// negative_pivots.
 class PencilFactor
 {
 public:
-  PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options);
+  /// `order`: one that is known; null: found here.
+  PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options, const EliminationOrder* order = nullptr);
   ~PencilFactor();
 
   /// Returns false if the shift is an eigenvalue. Throws LibraryError if memory runs out.
@@ -43,7 +57,9 @@ public:
 
 private:
   struct Parts;
-  template <class Solve> MultiVector solve_with(const MultiVector& X, const Solve& solution_of) const;
+  static MultiVector solve_with(Parts& parts, const MultiVector& X);
+  static void solve_by_columns(Parts& parts, MultiVector& Y);
+  static void solve_by_rows(Parts& parts, MultiVector& Y);
   std::unique_ptr<Parts> parts_;
 };
 

@@ -20,8 +20,10 @@ struct ShiftInvert
   std::unique_ptr<PencilFactor> factor{}; // of K - shift M
 };
 
-/// The pencil at shift 0, not yet factored. Collective. K and M are borrowed and must outlive it.
-ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options);
+/// The pencil at shift 0, not yet factored. Collective. K and M are borrowed and must outlive it. `order`: one that is
+/// known; null: found here.
+ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options,
+                              const EliminationOrder* order = nullptr);
 
 /// Factors K - shift M, or with a slightly lower shift where this one is an eigenvalue. Throws LibraryError if memory
 /// runs out.

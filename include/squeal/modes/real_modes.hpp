@@ -23,7 +23,8 @@ struct RealCount
   PencilOptions options{};
   std::vector<double> all{};     // eigenvalues omega^2 of a small problem
   std::map<double, int> below{}; // the counts so far
-  ShiftInvert pencil{};          // of a large problem, from the first count on
+  EliminationOrder order{};      // of a large problem, from the first count on
+  ShiftInvert pencil{};          // the same
 };
 
 /// A count for K x = omega^2 M x. Borrows M and K.
@@ -31,6 +32,9 @@ RealCount make_real_count(Mat M, Mat K, const ModesOptions& options);
 
 /// The number of eigenvalues below omega [rad/s].
 int count_below(RealCount& count, double omega);
+
+/// Of K, found once.
+const EliminationOrder& order_of(RealCount& count);
 
 /// Gives back the memory of the factor. A further count makes it again.
 void free_factor(RealCount& count);
