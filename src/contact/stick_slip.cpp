@@ -314,30 +314,50 @@ double StatusSystem::reciprocal_condition() const
   return pivots.minCoeff() / pivots.maxCoeff();
 }
 
+namespace
+{
+
+/// The part of a change, a power of a half, that leaves the least defect of the laws, or the first that lowers it. A
+/// whole change that raises it may send a body that its statuses leave free any distance away.
+StickSlipState after_change(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at,
+                            const StickSlipState& change)
+{
+  constexpr double least = 0x1p-8;
+  const double merit = sum_of_squares(of, friction, at);
+  StickSlipState best;
+  double lowest = std::numeric_limits<double>::infinity();
+  for (double part = 1; part >= least; part /= 2)
+  {
+    StickSlipState next{at.r + part * change.r, at.w + part * change.w};
+    const double defect = sum_of_squares(of, friction, next);
+    if (!(defect < lowest)) continue;
+    lowest = defect;
+    best = std::move(next);
+    if (lowest < merit * (1 - 1e-4 * part)) break;
+  }
+  return std::isfinite(lowest) ? best : StickSlipState{at.r + change.r, at.w + change.w};
+}
+
+} // namespace
+
 StickSlipSolution solve_stick_slip(const StickSlipOperator& of, const StickSlipFriction& friction, const VectorXd& q,
                                    StickSlipState guess)
 {
-  constexpr int most = 60, patience = 15; // iterations in all, and without a smaller residual
+  constexpr int most = 200, patience = 40; // iterations in all, and without a smaller defect of the laws
   StickSlipSolution best{guess, 0, std::numeric_limits<double>::infinity()};
   StickSlipState at = std::move(guess);
+  double least = std::numeric_limits<double>::infinity();
   int last_gain = 0;
   for (int iteration = 0; iteration <= most && iteration - last_gain <= patience; ++iteration)
   {
     const double residual = std::max(stick_slip_residual(of, friction, at), imbalance(of, q, at));
-    if (residual < best.residual) best = {at, iteration, residual}, last_gain = iteration;
+    if (residual < best.residual) best = {at, iteration, residual};
     if (!std::isfinite(at.r.sum() + at.w.sum()) || residual <= tight) break;
     const StatusSystem system(of, friction, at);
     const StickSlipState change = system.change(q + times_M(of, at.r) - of.N * at.w);
-    const double merit = sum_of_squares(of, friction, at);
-    double part = 1;
-    StickSlipState next{at.r + change.r, at.w + change.w};
-    for (int halving = 0; halving < 6 && !(sum_of_squares(of, friction, next) < merit * (1 - 1e-4 * part)); ++halving)
-    {
-      part /= 2;
-      next = {at.r + part * change.r, at.w + part * change.w};
-    }
-    if (!(sum_of_squares(of, friction, next) < merit)) next = {at.r + change.r, at.w + change.w}; // statuses change
-    at = std::move(next);
+    // the first change balances the load: a guess that fulfils the laws, as that of no forces does, is no measure
+    at = iteration == 0 ? StickSlipState{at.r + change.r, at.w + change.w} : after_change(of, friction, at, change);
+    if (const double defect = sum_of_squares(of, friction, at); defect < least) least = defect, last_gain = iteration;
   }
   best.converged = best.residual <= good;
   return best;
