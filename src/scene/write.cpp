@@ -153,9 +153,16 @@ SceneKeys keys_of_table(const TableTarget& table)
 /// What a key's value must be: one of its words, or a number by its rule. Empty: the unit says it.
 std::string rule_text(const SceneKey& key)
 {
-  static constexpr std::array rules = {
-      "",          "above 0",    "0 or above",    "above -1, below 0.5", "above 0, at most 1",
-      "direction", "zero: none", "existing file", "existing folder"};
+  static constexpr std::array rules = {"",
+                                       "above 0",
+                                       "0 or above",
+                                       "above -1, below 0.5",
+                                       "above 0, at most 1",
+                                       "direction",
+                                       "zero: none",
+                                       "no negative xx, yy or zz",
+                                       "existing file",
+                                       "existing folder"};
   Words words;
   if (const auto* choice = std::get_if<Choice>(&key.target)) words = choice->words;
   if (const auto* start = std::get_if<StartTarget>(&key.target)) words = start->kind.words;
