@@ -76,7 +76,8 @@ void add_verdict(Entry out, const Multipliers& multipliers)
   out.error("largest_error", "its error bar", values.empty() ? 0 : multipliers.errors.front());
   out.show("upper_bound", "-", "bound of all moduli; below 1: stable", largest_upper_bound(multipliers));
   out.show("count", "-", "multipliers that were computed", values.size());
-  out.add("trivial_error", "-", "distance from 1 of the multiplier of a shift in time", multipliers.trivial_error);
+  out.add("trivial_error", "-", "distance from 1 of the multiplier of a shift in time, the largest of the grids",
+          multipliers.trivial_error);
   out.add("periods_integrated", "-", "columns of the tangent, beside the periods of the cycle", multipliers.periods);
   add_multipliers(out, "values", multipliers);
   if (out.has(multipliers.offsets > 0))

@@ -104,7 +104,6 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
     add_changes(values, values_of(on_others[k]), other_grids[k].part, grid);
   const std::size_t shift = find_shift(pairs, Q.transpose() * coordinates_of(orbit.rate, orbit.period));
   multipliers.trivial_error = std::abs(values[shift] - 1.);
-  double largest_trivial_error = multipliers.trivial_error;
   // over eight periods the orbit's own error must not lead away from it
   const bool stays = std::pow(std::max(1., std::abs(values.front())), 8) * orbit.residual < 1e-2;
   if (stays)
@@ -122,14 +121,14 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
       const auto i = static_cast<std::size_t>(places[k]);
       grid.errors[i] = std::max(grid.errors[i], std::abs(others[k] - values[i]));
       grid.rises[i] = std::max(grid.rises[i], std::abs(others[k]) - std::abs(values[i]));
-      if (i == shift) largest_trivial_error = std::max(largest_trivial_error, std::abs(others[k] - 1.));
+      if (i == shift) multipliers.trivial_error = std::max(multipliers.trivial_error, std::abs(others[k] - 1.));
     }
   }
   for (std::size_t i = 0; i < values.size(); ++i)
   {
     if (i == shift) continue;
     constexpr double rounding = 1e-9;
-    const double least = std::max(rounding, largest_trivial_error);
+    const double least = std::max(rounding, multipliers.trivial_error);
     multipliers.values.push_back(values[i]);
     multipliers.errors.push_back(std::max(grid.errors[i], least));
     multipliers.upper.push_back(std::abs(values[i]) + std::max(grid.rises[i], least));
@@ -138,12 +137,12 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   if (pairs.empty()) return result;
   decide(multipliers, {true, ""});
   if (multipliers.stability == Stability::undecided &&
-      largest_trivial_error > 0.5 * multipliers.errors[deciding_place(multipliers)])
+      multipliers.trivial_error > 0.5 * multipliers.errors[deciding_place(multipliers)])
     multipliers.would_decide = format(
         "the multiplier of a shift in time, which is 1, misses it by %.1e along a grid of time, as where contact "
         "hits masses within steps: contact with a compliance would decide, or -cycle_watched_periods where the "
         "largest value alone reaches across 1",
-        largest_trivial_error);
+        multipliers.trivial_error);
   result.fastest =
       fastest_motion(monodromy.flow, pairs.front(), [&](const Eigen::VectorXd& y) { return state_at(Q * y, orbit); });
   return result;
