@@ -1,7 +1,7 @@
 #include "squeal/study/sensitivity.hpp"
 
 #include "held_vectors.hpp"
-#include "squeal/modes/dense_losses.hpp"
+#include "squeal/reduction/sliding_basis.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -32,8 +32,8 @@ std::vector<PairDamping> pair_dampings(const SlidingEquilibrium& sliding, const 
 {
   const auto& [structure, interface, equilibrium] = sliding;
   const TangentView drive(interface.drive, interface.directions);
-  const auto parts = right_parts(vectors, mode, structure.load);
-  const std::vector<double> re = relative(interface, parts[0]), im = relative(interface, parts[1]);
+  const std::vector<double> re = relative(interface, column(vectors.right, mode, structure.load)),
+                            im = relative(interface, column(vectors.right, mode + vectors.count(), structure.load));
   const PairView real(re, interface.directions), imaginary(im, interface.directions),
       reactions(equilibrium.reactions, interface.directions);
   std::vector<PairDamping> result(equilibrium.closed.size());
@@ -56,41 +56,8 @@ std::vector<PairDamping> pair_dampings(const SlidingEquilibrium& sliding, const 
   return result;
 }
 
-/// right^H A right of a mode by the springs of the closed pairs with a compliance, of each contact.
-std::vector<double> strain_of_contacts(const SlidingEquilibrium& sliding, const HeldVectors& vectors, std::size_t mode)
-{
-  const auto& [structure, interface, equilibrium] = sliding;
-  const std::vector<Complex> normal = pair_motions(sliding, vectors, mode).normal;
-  std::vector<double> strain;
-  for (std::size_t i = 0; i < normal.size(); ++i)
-    if (const double compliance = compliance_of(interface, i); compliance > 0 && equilibrium.closed[i])
-    {
-      const std::size_t contact = contact_of(interface, i);
-      strain.resize(std::max(strain.size(), contact + 1));
-      strain[contact] += std::norm(normal[i]) / compliance;
-    }
-  return strain;
-}
-
-/// right^H A right of each mode, of M, C without friction and losses, K with the springs of the pairs, and the K of
-/// loss factors.
-struct ModeEnergies
-{
-  std::vector<double> mass, damping, stiffness, loss;
-};
-
-ModeEnergies energies_of(const SlidingEquilibrium& sliding, const HeldVectors& vectors)
-{
-  const Structure& structure = sliding.structure;
-  ModeEnergies energies{quadratic_forms(structure.M, vectors), quadratic_forms(vectors.basis.C.matrix, vectors),
-                        quadratic_forms(structure.K, vectors), quadratic_forms(structure.K_loss, vectors)};
-  for (std::size_t j = 0; j < vectors.count(); ++j)
-    for (const double strain : strain_of_contacts(sliding, vectors, j)) energies.stiffness[j] += strain;
-  return energies;
-}
-
 /// Powers of the pairs, of their friction and of damping: their sum is twice the growth rate.
-void find_powers(const SlidingEquilibrium& sliding, const HeldVectors& vectors, const ModeEnergies& energies,
+void find_powers(const SlidingEquilibrium& sliding, const HeldVectors& vectors, const AtHeldVectors& held,
                  Sensitivity& result)
 {
   const Interface& interface = sliding.interface;
@@ -98,8 +65,9 @@ void find_powers(const SlidingEquilibrium& sliding, const HeldVectors& vectors, 
   {
     ModeCauses& causes = result.modes[j];
     const Complex lambda = vectors.lambda[j];
-    const double energy = std::norm(lambda) * energies.mass[j] + energies.stiffness[j];
-    const std::vector<Complex> motion = pair_motions(sliding, vectors, j).friction;
+    const double energy = std::norm(lambda) * held.mass[j] + held.stiffness[j];
+    const std::vector<Complex> motion =
+        pair_motions(interface, vectors.right, j, vectors.count(), sliding.structure.load).friction;
     const std::vector<PairDamping> dampings = pair_dampings(sliding, vectors, j);
     double sum = 0;
     const auto put_in = [&](std::vector<double>& powers, std::size_t contact, double power)
@@ -118,14 +86,32 @@ void find_powers(const SlidingEquilibrium& sliding, const HeldVectors& vectors, 
       put_in(causes.falling_friction_powers, contact, scale * dampings[i].of_speed);
       put_in(causes.turning_friction_powers, contact, scale * dampings[i].of_direction);
     }
-    const double loss = std::real(std::conj(lambda) * loss_factor_of(lambda)) * energies.loss[j];
-    causes.damping_power = 2 * (std::norm(lambda) * energies.damping[j] + loss) / energy;
+    const double loss = std::real(std::conj(lambda) * loss_factor_of(lambda)) * held.loss[j];
+    causes.damping_power = 2 * (std::norm(lambda) * held.damping[j] + loss) / energy;
     causes.defect = sum - causes.damping_power - 2 * lambda.real();
   }
 }
 
+/// The strain energy of the closed pairs with a compliance, over that of the mode, of each contact.
+std::vector<double> strain_of_contacts(const SensitivityProblem& problem, const HeldVectors& vectors,
+                                       const AtHeldVectors& held, std::size_t mode)
+{
+  const auto& [structure, interface, equilibrium] = problem.sliding;
+  const std::vector<Complex> normal =
+      pair_motions(interface, vectors.right, mode, vectors.count(), structure.load).normal;
+  std::vector<double> strain(problem.contacts.size());
+  for (std::size_t i = 0; i < normal.size(); ++i)
+    if (const double compliance = compliance_of(interface, i); compliance > 0 && equilibrium.closed[i])
+    {
+      const std::size_t contact = contact_of(interface, i);
+      strain.resize(std::max(strain.size(), contact + 1));
+      strain[contact] += std::norm(normal[i]) / compliance / held.stiffness[mode];
+    }
+  return strain;
+}
+
 /// What each component holds of the energies: what doubling its mass and stiffness adds.
-void find_shares(const SensitivityProblem& problem, const HeldVectors& vectors, const ModeEnergies& energies,
+void find_shares(const SensitivityProblem& problem, const HeldVectors& vectors, const AtHeldVectors& held,
                  Sensitivity& result)
 {
   const std::vector<double> stiffness = quadratic_forms(problem.sliding.structure.K, vectors);
@@ -136,17 +122,16 @@ void find_shares(const SensitivityProblem& problem, const HeldVectors& vectors, 
     const std::vector<double> M = quadratic_forms(doubled.structure.M, vectors),
                               K = quadratic_forms(doubled.structure.K, vectors);
     for (std::size_t j = 0; j < vectors.count(); ++j)
-      result.modes[j].shares.push_back({component.table, component.name, (M[j] - energies.mass[j]) / energies.mass[j],
-                                        (K[j] - stiffness[j]) / energies.stiffness[j]});
+      result.modes[j].shares.push_back({component.table, component.name, (M[j] - held.mass[j]) / held.mass[j],
+                                        (K[j] - stiffness[j]) / held.stiffness[j]});
   }
   for (std::size_t j = 0; j < vectors.count(); ++j)
   {
     std::vector<EnergyShare>& shares = result.modes[j].shares;
-    const std::vector<double> strain = strain_of_contacts(problem.sliding, vectors, j);
+    const std::vector<double> strain = strain_of_contacts(problem, vectors, held, j);
     for (std::size_t i = 0; i < strain.size(); ++i)
       if (strain[i] > 0)
-        shares.push_back(
-            {"contact", i < problem.contacts.size() ? problem.contacts[i] : "", 0, strain[i] / energies.stiffness[j]});
+        shares.push_back({"contact", i < problem.contacts.size() ? problem.contacts[i] : "", 0, strain[i]});
     EnergyShare rest{"", "", 1, 1};
     for (const EnergyShare& share : shares) rest.kinetic -= share.kinetic, rest.strain -= share.strain;
     for (const SceneComponent& component : problem.components)
@@ -166,7 +151,7 @@ bool same_contact(const Interface& a, const Interface& b)
 class NumberDerivatives
 {
 public:
-  NumberDerivatives(const SensitivityProblem& problem, HeldVectors& vectors, const AtHeldVectors& held)
+  NumberDerivatives(const SensitivityProblem& problem, const HeldVectors& vectors, const AtHeldVectors& held)
       : problem_(problem), vectors_(vectors), held_(held), equilibria_(problem.equilibrium_options)
   {
     equilibria_.expect(problem.sliding.equilibrium.closed);
@@ -234,11 +219,14 @@ private:
   }
 
   /// Of some modes by a central difference of fourth order, whose steps of a hundredth leave 1e-8 of a number's
-  /// inverse, say; of a thousandth where other pairs are closed there, or the values make no scene. By one side where
-  /// that holds of these, too.
+  /// inverse, say; of a thousandth where other pairs are closed there, or the values make no scene. Steps to one side
+  /// are longer and have less rounding: they are taken where they agree with the central difference within its
+  /// rounding, as where the number enters linearly, or where there is none.
   void take_long_steps(const SceneNumber& number, const std::vector<std::size_t>& modes,
                        std::vector<NumberDerivative>& result)
   {
+    constexpr double rounding = 1e-14;
+    const auto one_sided = by_one_side(number);
     for (const double part : {1e-2, 1e-3})
     {
       const double step = part * number.value;
@@ -247,10 +235,14 @@ private:
       if (!below || !above || !far_below || !far_above) continue;
       const auto central =
           quotients(number, step, {{2. / 3, *above}, {-2. / 3, *below}, {-1. / 12, *far_above}, {1. / 12, *far_below}});
-      for (const std::size_t j : modes) result[j] = central[j];
+      for (const std::size_t j : modes)
+      {
+        const double difference = std::abs(one_sided[j].lambda - central[j].lambda);
+        const bool agree = one_sided[j].known && difference <= rounding * std::abs(vectors_.lambda[j] / step);
+        result[j] = agree ? one_sided[j] : central[j];
+      }
       return;
     }
-    const auto one_sided = by_one_side(number);
     for (const std::size_t j : modes) result[j] = one_sided[j];
   }
 
@@ -305,13 +297,13 @@ private:
   }
 
   const SensitivityProblem& problem_;
-  HeldVectors& vectors_;
+  const HeldVectors& vectors_;
   const AtHeldVectors& held_;
   Equilibria equilibria_;
 };
 
-/// By the change of the residual, with vectors held and the equilibrium free to change.
-void find_number_derivatives(const SensitivityProblem& problem, HeldVectors& vectors, const AtHeldVectors& held,
+/// By the change of the residual, with vectors and reactions held and the equilibrium free to change.
+void find_number_derivatives(const SensitivityProblem& problem, const HeldVectors& vectors, const AtHeldVectors& held,
                              Sensitivity& result)
 {
   NumberDerivatives derivatives(problem, vectors, held);
@@ -408,12 +400,11 @@ Sensitivity find_sensitivity(const SensitivityProblem& problem)
 {
   Sensitivity result;
   result.outcome.kind = OutcomeKind::converged;
-  HeldVectors vectors = unstable_vectors(problem, result);
+  const HeldVectors vectors = unstable_vectors(problem, result);
   if (vectors.count() == 0) return result;
   const AtHeldVectors held = at_held_vectors(problem.sliding, vectors);
-  const ModeEnergies energies = energies_of(problem.sliding, vectors);
-  find_powers(problem.sliding, vectors, energies, result);
-  find_shares(problem, vectors, energies, result);
+  find_powers(problem.sliding, vectors, held, result);
+  find_shares(problem, vectors, held, result);
   find_number_derivatives(problem, vectors, held, result);
   find_probe_derivatives(problem, vectors, held, result);
   find_change_effects(problem, result);
