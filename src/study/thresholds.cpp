@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <map>
 
 namespace squeal
@@ -81,20 +82,21 @@ bool changes(const Followed& a, const Followed& b, const Group& group)
   return false;
 }
 
-/// The growth of that place among all in falling order, which is continuous whether or not modes can be distinguished.
-/// Where there are fewer modes there is no growth.
-double ranked_growth(const Followed& point, std::size_t rank)
+/// Where modes go that are matched among themselves alone; nothing: they mix with others, or are lost.
+std::optional<PointNumbers> images(const PointNumbers& places, const std::vector<Match>& matches)
 {
-  std::vector<double> growth;
-  for (std::size_t k = 0; k < point.modes.pairs.size(); ++k) growth.push_back(instability(point, k));
-  std::ranges::sort(growth, std::greater{});
-  return rank < growth.size() ? growth[rank] : -1;
-}
-
-std::size_t unstable_modes(const Followed& point)
-{
-  return static_cast<std::size_t>(
-      std::ranges::count_if(point.modes.pairs, [](const TwoSidedPair& pair) { return is_unstable(pair.lambda); }));
+  PointNumbers to;
+  for (const std::size_t i : places)
+  {
+    if (matches[i].to < 0) return std::nullopt;
+    to.push_back(static_cast<std::size_t>(matches[i].to));
+  }
+  for (std::size_t k = 0; k < matches.size(); ++k)
+    for (const std::size_t i : places)
+      if (matches[k].to >= 0 && matches[k].cluster == matches[i].cluster &&
+          std::ranges::find(places, k) == places.end())
+        return std::nullopt;
+  return to;
 }
 
 class Finder
@@ -109,7 +111,7 @@ public:
     const auto changing = std::ranges::find_if(groups, [&](const Group& group) { return changes(a, b, group); });
     if (changing != groups.end() && std::abs(b.values[0] - a.values[0]) > search_.tolerance)
     {
-      std::vector<Followed> points = points_between(a, b);
+      std::vector<Followed> points = points_between(a, b, *changing);
       if (!points.empty())
       {
         const std::size_t known = found_.size();
@@ -134,6 +136,13 @@ public:
   std::vector<Threshold> found() { return std::move(found_); }
 
 private:
+  /// A point with the modes of a group there.
+  struct Known
+  {
+    const Followed* point;
+    PointNumbers places;
+  };
+
   std::optional<Followed> point_at(double value)
   {
     if (ended_ || points_++ == most_points) ended_ = true;
@@ -143,26 +152,46 @@ private:
     return point;
   }
 
-  /// Points that enclose a threshold to the tolerance, or halve the step, in the order of the way. Of the growth rates
-  /// in falling order the first one past the smaller number of unstable modes changes its sign.
-  std::vector<Followed> points_between(const Followed& a, const Followed& b)
+  /// Points that enclose a threshold of the group to the tolerance, or halve the step, in the order of the way.
+  std::vector<Followed> points_between(const Followed& a, const Followed& b, const Group& group)
   {
-    std::vector<Followed> points;
-    const std::size_t before = unstable_modes(a), after = unstable_modes(b), rank = std::min(before, after);
+    std::deque<Followed> points; // which stay where they are
+    if (!enclose(a, b, group, points) && !ended_)
+      if (std::optional<Followed> middle = point_at((a.values[0] + b.values[0]) / 2))
+        points.push_back(std::move(*middle));
+    const bool rising = b.values[0] > a.values[0];
+    std::ranges::sort(points, [&](const Followed& x, const Followed& y)
+                      { return rising ? x.values[0] < y.values[0] : x.values[0] > y.values[0]; });
+    return {std::make_move_iterator(points.begin()), std::make_move_iterator(points.end())};
+  }
+
+  /// Of the modes of a group the growth rates are sorted: they are continuous whether or not the modes can be
+  /// distinguished, and the first one past the smaller number of unstable modes changes its sign. False: the numbers
+  /// are equal, or the group mixes with others on the way.
+  bool enclose(const Followed& a, const Followed& b, const Group& group, std::deque<Followed>& points)
+  {
+    const std::size_t before = unstable_among(a, group.from), after = unstable_among(b, group.to);
+    if (!group.matched || before == after) return false;
+    const std::size_t rank = std::min(before, after);
+    const auto ranked = [&](const Followed& point, const PointNumbers& places)
+    { return instability(point, by_growth(point, places)[rank]); };
+    std::vector<Known> known = {{&a, group.from}, {&b, group.to}};
+    bool clear = true;
     const auto growth = [&](double value) -> std::optional<double>
     {
       std::optional<Followed> here = point_at(value);
       if (!here) return std::nullopt;
+      const Known& nearest = *std::ranges::min_element(
+          known, {}, [&](const Known& one) { return std::abs(one.point->values[0] - value); });
+      const std::optional<PointNumbers> places = images(nearest.places, search_.follow(*nearest.point, *here));
       points.push_back(std::move(*here));
-      return ranked_growth(points.back(), rank);
+      clear = places.has_value();
+      if (!clear) return std::nullopt;
+      known.push_back({&points.back(), *places});
+      return ranked(points.back(), *places);
     };
-    if (before != after)
-      find_root(growth, {a.values[0], b.values[0], ranked_growth(a, rank), ranked_growth(b, rank)}, search_.tolerance);
-    if (points.empty() && !ended_) growth((a.values[0] + b.values[0]) / 2);
-    const bool rising = b.values[0] > a.values[0];
-    std::ranges::sort(points, [&](const Followed& x, const Followed& y)
-                      { return rising ? x.values[0] < y.values[0] : x.values[0] > y.values[0]; });
-    return points;
+    find_root(growth, {a.values[0], b.values[0], ranked(a, group.from), ranked(b, group.to)}, search_.tolerance);
+    return clear && !points.empty();
   }
 
   /// What a step that is not divided any further holds: as many thresholds as the group's unstable modes become more or
