@@ -146,8 +146,9 @@ template <class Matrix> std::vector<TwoSidedPair> solve_companion(const Matrix& 
   const Index n = K.rows();
   const double stiffness = norm_1(K), mass = norm_1(M);
   if (mass == 0 || stiffness == 0) return result;
-  const bool all = !std::isfinite(limit);
-  const double omega = all ? std::sqrt(stiffness / mass) : limit;
+  const double largest = std::sqrt(stiffness / mass); // far above all eigenvalues a limit is no scale
+  const bool all = !(limit < largest);
+  const double omega = all ? largest : limit;
   const double shift = all ? 1e-2 : 0.2; // of nu: any that is no eigenvalue
   const Matrix m = omega * omega / stiffness * M, c = omega / stiffness * C, k = K / stiffness;
   const auto factor =

@@ -256,9 +256,7 @@ SolvedPairs solve_projected(const ModesBasis& modes, const PointMatrices& on_bas
     for (MatrixXd& A : problem)
       if (A.size() > 0) A = (spaces.left.transpose() * A * spaces.right).eval();
   }
-  // eigenvalues far below the scale would lose their digits, where the band is far above all of them
-  const double scale = std::sqrt(std::min(window.limit, problem[2].norm() / problem[0].norm()));
-  std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(comm, problem, scale);
+  std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(comm, problem, std::sqrt(window.limit));
   std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !window.holds(pair.lambda); });
   if (extent == Extent::near_band) transform(pairs, spaces.right, spaces.left);
   if (const MatrixXd& V = on_basis.independent; V.size() > 0) transform(pairs, V, V);
