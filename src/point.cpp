@@ -89,14 +89,11 @@ std::vector<Estimate> estimates_at(const SlidingPoint& point, const Scene& scene
   return estimates;
 }
 
-/// Whether several modes oscillate and grow, each of which may lead to a motion of its own, and a few trajectories of
-/// the model cost little.
+/// Whether a mode grows, and a trajectory of the model costs little.
 bool may_lead_elsewhere(const SlidingPoint& point)
 {
-  constexpr double steps = 16. * 400 * 256; // of starts, periods each, steps a period
-  const auto oscillates = [](const ComplexMode& mode) { return mode.frequency_hz() > 0; };
-  return steps * work_of_step(point.model->structure) <= affordable_work &&
-         std::ranges::count_if(point.modes.unstable(), oscillates) > 1;
+  constexpr double steps = 400 * 256; // of periods, steps a period
+  return point.modes.unstable_count > 0 && steps * work_of_step(point.model->structure) <= affordable_work;
 }
 
 } // namespace

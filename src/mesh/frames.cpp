@@ -12,10 +12,10 @@ Eigen::Matrix3d axes_at(const Frame& frame, const Vec3& place, const std::string
   Vec3 first = frame.axis_1, second = frame.axis_2;
   if (frame.cylinder)
   {
-    constexpr double rounding = 1e-9; // of the distance to the centre
+    constexpr double rounding = 1e-9; // of the distances to the origin
     const auto& [axis, centre] = *frame.cylinder;
     const Vec3 arm = place - centre, radius = arm - dot(arm, axis) * axis;
-    if (norm(radius) <= rounding * norm(arm))
+    if (norm(radius) <= rounding * std::max(norm(place), norm(centre)))
       throw Error(user + format(": (%g, %g, %g) is on the axis of its cylinder, where no direction is radial: leave it "
                                 "out of the group, or move the axis",
                                 place[0], place[1], place[2]));

@@ -287,7 +287,7 @@ void add_settled(Entry out, const Report& report)
   out.add("would_decide", "text", "of an undecided one: what would decide", motion.verdict.would_decide);
   out.show("periods", "-", "windows of a period that were integrated", motion.periods());
   out.show("discarded", "-", "of these, before the motion was stationary", motion.discarded);
-  out.show("period", "s", "length of a window: the period of its strongest line", settled.period);
+  out.show("period", "s", "length of a window: the nearest recurrence of the free motion", settled.period);
   out.add("steps_per_period", "-", "time steps of a window", settled.steps_per_period);
   out.mean("mean_energy", "J", "mean mechanical energy", settled.energy);
   out.mean("mean_fluctuating_energy", "J", "mean energy about equilibrium", settled.fluctuating_energy);

@@ -71,7 +71,8 @@ PeriodSample sample_of(const History& history, int probe)
 PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, PetscInt shapes, SettledMotion& motion)
 {
   History& all = motion.history;
-  const double begun = all.time.empty() ? 0 : all.time.back();
+  const bool first = all.time.empty();
+  const double begun = first ? 0 : all.time.back();
   State now{copy_of(displacement(state)), copy_of(velocity(state)), begun, map.reactions};
   map.records.clear();
   map.records.resize(static_cast<std::size_t>(map.steps));
@@ -92,26 +93,8 @@ PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, PetscIn
   check(VecCopy(now.u, displacement(state)));
   check(VecCopy(now.v, velocity(state)));
   append(history, all);
+  if (first) motion.spectrum_probe = largest_probe(history);
   return sample_of(history, motion.spectrum_probe);
-}
-
-/// Where the motion's own period is not the window that the search ended with, it becomes the window, in steps as long.
-/// A stretch of the motion, which is not counted, shows the probe that swings most and its strongest line.
-void take_own_period(const CycleProblem& problem, PeriodMap& map, Vec state, SettledMotion& motion)
-{
-  constexpr int stretch = 64;                // windows
-  constexpr double fewest = 8, alike = 0.05; // steps in a period, since rounding has lines, too; of the window
-  SettledMotion seen;
-  for (int k = 0; k < stretch; ++k) integrate_period(map, problem.probes, state, 0, seen);
-  motion.spectrum_probe = largest_probe(seen.history);
-  const double step = motion.period / motion.steps_per_period;
-  const double own =
-      1 / base_frequencies(spectrum_of(series_of(seen.history, motion.spectrum_probe), step)).first; // may be infinite
-  if (!std::isfinite(own) || own < fewest * step || std::abs(own / motion.period - 1) < alike) return;
-  motion.period = own;
-  motion.steps_per_period = static_cast<int>(std::lround(own / step));
-  map.steps = motion.steps_per_period;
-  set_period(map, own);
 }
 
 /// Names the parts of what was examined.
@@ -246,8 +229,7 @@ void take_as_answer(const SettledMotion& motion, Outcome& of_cycle)
 SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, SettledOptions options)
 {
   const double of_period = cycle.steps_per_period * work_of_step(problem.sliding.structure);
-  const bool chosen = options.periods == 0;
-  if (chosen) options.periods = is_dear(of_period) ? 512 : 2048;
+  if (options.periods == 0) options.periods = is_dear(of_period) ? 512 : 2048;
   SettledMotion motion;
   PeriodMap map{problem.sliding, problem.step, cycle.steps_per_period, cycle.theta};
   map.reactions = problem.sliding.equilibrium.reactions;
@@ -256,10 +238,6 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
   motion.steps_per_period = cycle.steps_per_period;
   motion.period = cycle.free.period;
   Owned<Vec> state = copy_of(cycle.free.state.get());
-  take_own_period(problem, map, state, motion);
-  constexpr PetscInt least = 128;                   // periods, fewer of which show no kind
-  if (chosen && map.steps > cycle.steps_per_period) // as many steps in all
-    options.periods = std::max(least, options.periods * cycle.steps_per_period / map.steps);
   motion.shapes = no_shapes(problem.sliding.structure.M);
   motion.sampled_steps = steps_between_samples(motion.steps_per_period, motion.period / motion.steps_per_period);
   const auto sampler = [&](Vec now) { return integrate_period(map, problem.probes, now, options.shapes, motion); };

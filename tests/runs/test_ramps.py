@@ -77,8 +77,8 @@ def test_the_refusal_of_steep_friction_knows_the_ramps(squeal, load, friction):
 
 
 BAD = {
-    "no rows": ({"load_factor": "1"}, ["transient.load_factor=1", "load_factor", "rows [time in s, factor]"]),
-    "a row of three": ({"load_factor": "[[0, 1, 2]]"}, ["load_factor", "rows [time in s, factor]"]),
+    "no rows": ({"load_factor": "1"}, ["transient.load_factor=1", "load_factor", "rows [time in s or speed in m/s, factor]"]),
+    "a row of three": ({"load_factor": "[[0, 1, 2]]"}, ["load_factor", "rows [time in s or speed in m/s, factor]"]),
     "times that fall": ({"speed_factor": "[[1, 0], [0.5, 1]]"}, ["speed_factor", "a first number above that of the row before"]),
     "negative friction": ({"friction_factor": "[[0, -1]]"}, ["friction_factor", "zero or above"]),
     "rest under load": ({"load_factor": "[[0, 1]]"}, ["transient.load_factor=[[0, 1]]", 'start = "rest"', "rise from 0"]),

@@ -141,9 +141,7 @@ def test_where_no_cycle_of_the_pin_attracts_the_settled_motion_answers(converged
     assert f"{settled['base_frequencies_hz']['first']:.5g}" in report["heard"]
     energy = settled["mean_fluctuating_energy"]
     assert 0 < energy["error"] < energy["mean"]
-    # a window is a period of the strongest line, whatever the search for a cycle ended with
     strongest = settled["lines"][0]
-    assert settled["period"] * strongest["frequency_hz"] == pytest.approx(1, rel=0.1)
     assert 0 < strongest["frequency_error"] < 0.1 * strongest["frequency_hz"]
     for part in ("open", "stick", "slip"):
         assert 0 <= settled[f"{part}_fraction"]["mean"] <= 1

@@ -13,7 +13,7 @@ struct SettledMotion
 {
   Outcome outcome;
   int steps_per_period = 0;
-  double period = 0; // [s] of the windows that are called periods here: the motion's own
+  double period = 0; // [s] of the windows that are called periods here
   ExaminedMotion examined;
   int spectrum_probe = -1;              // whose spectrum it is: the one that swings most [m]; -1: the normal force [N]
   MeanValue fluctuating_energy, energy; // [J]
