@@ -53,6 +53,7 @@ PathWalk unloaded(const PathProblem& problem)
   const PairView<double> offset(walk.offset, problem.of.directions);
   for (std::size_t pair = 0; pair < problem.gap.size(); ++pair) offset.normal(pair) = problem.gap[pair];
   walk.state.w = walk.offset;
+  walk.friction = friction_at(problem, {0, 0});
   return walk;
 }
 

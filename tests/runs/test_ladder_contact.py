@@ -1,6 +1,5 @@
 """Contact at rest against exact answers: patch, series stack, overturning block, Hertz, and the sums of every scene."""
 
-import re
 
 import h5py
 import numpy as np
@@ -105,42 +104,6 @@ def quads8(nodes):
     places = ((0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1))
     n, m = (size - 2 for size in nodes.shape)
     return np.stack([nodes[i:n + i:2, j:m + j:2].ravel() for i, j in places], axis=-1)
-
-
-@pytest.fixture(scope="module")
-def shrink_fit():
-    """A quarter of a hub on a hollow shaft, 8 elements round, 10 um too small; tables of its scene."""
-    mesh = Mesh()
-    for name, inner, outer in (("shaft", .01, .02), ("hub", .02, .04)):
-        def place(r, angle, z, inner=inner, outer=outer):
-            radius = inner + (outer - inner) * r
-            return radius * np.cos(np.pi / 2 * angle), radius * np.sin(np.pi / 2 * angle), .01 * z
-
-        nodes = mesh.add_nodes(lattice((4, 16, 2), place))
-        mesh.add(name, "brick20", bricks20(nodes))
-        for face, of in {"inner": nodes[0], "outer": nodes[-1], "y=0": nodes[:, 0], "x=0": nodes[:, -1], "low": nodes[:, :, 0],
-                         "end": nodes[:, :, -1]}.items():
-            mesh.add(f"{name}:{face}", "quad8", quads8(of))
-    symmetry = [{"on": f"{name}:{axis}=0", "fixed": axis} for name in ("shaft", "hub") for axis in "xy"]
-    return mesh, {"part": [{"name": name, "young": 210e9, "poisson": 0.0, "density": 1} for name in ("shaft", "hub")],
-                  "contact": [{"rotor": "shaft:outer", "stator": "hub:inner", "gap": -1e-5, "friction": .15}],
-                  "support": [*symmetry, {"on": "hub:low", "fixed": "z"}]}
-
-
-@pytest.mark.parametrize("ranks", [1, 2, 3])
-def test_a_shrink_fit_holds_by_its_pressure_and_slips_at_friction_of_all_of_it(squeal, tmp_path, shrink_fit, ranks):
-    """Lame: each ring of radii a < b and c < a gives by (b2 + a2)/(b2 - a2) and (a2 + c2)/(a2 - c2) of p a/E; 1 %."""
-    pressure = 210e9 * 1e-5 / .02 / (2 * 5 / 3)
-    normal = pressure * np.pi / 2 * .02 * .01
-    mesh, tables = shrink_fit
-    limit = .15 * normal / (np.pi / 4 * (.02**2 - .01**2))  # of a pull on the end
-    steps = [{"name": "fit", "load": 0}, {"name": "pull"}]
-    held = at_rest(squeal, tmp_path, ranks, mesh, step=steps, pressure=[{"on": "shaft:end", "value": -.9 * limit}], **tables)
-    assert held.code == 0, held.printed + held.errors
-    assert held.report["equilibrium"]["contacts"][0]["normal_force_sum"] == pytest.approx(normal, rel=1e-2)
-    torn = at_rest(squeal, tmp_path, ranks, mesh, step=steps, pressure=[{"on": "shaft:end", "value": -1.5 * limit}], **tables)
-    part = re.search("beyond ([0-9.]+) of step 'pull'", torn.printed + torn.errors)
-    assert part and float(part[1]) == pytest.approx(1 / 1.5, rel=1e-2), torn.printed
 
 
 @both

@@ -273,7 +273,8 @@ TEST_CASE("an unknown key gives file, line, table and the nearest key")
   check_message(error_of(replaced(brake, "density = 7800", "densty = 7800"), {}),
                 {"scene.toml, line 10", "[[part]] disc", "'densty'", "did you mean 'density'"});
   check_message(error_of(replaced(brake, "axis = \"z\"", "axes = \"z\""), {}), {"rotation", "'axes'", "'axis'"});
-  check_message(error_of("fooooooooooooo = 1\n" + points, {}), {"line 1", "known: title, fidelity, accuracy, mesh"});
+  check_message(error_of("fooooooooooooo = 1\n" + points, {}),
+                {"line 1", "known: title, fidelity, accuracy, gravity, mesh"});
 }
 
 TEST_CASE("wrong types, signs and ranges are refused with key, value and what is expected")
@@ -343,7 +344,6 @@ TEST_CASE("names that are doubled or not defined are refused")
   check_message(error_of(replaced(brake, "name = \"hub\"", "name = \"disc\""), {}), {"[[part]]", "\"disc\"", "taken"});
   check_message(error_of(replaced(brake, "name = \"eye\"", "name = \"ground\""), {}), {"\"ground\"", "taken"});
   check_message(error_of(replaced(brake, "name = \"eye\"", "name = \"carrier\""), {}), {"\"carrier\"", "taken"});
-  check_message(error_of(replaced(brake, "from = \"carrier\"", "from = \"carier\""), {}), {"'carrier'"});
   check_message(error_of(replaced(brake, "from = \"carrier\"", "from = \"ground\""), {}), {"both"});
   check_message(error_of(replaced(points, "rotor = \"disc\"", "rotor = \"disk\""), {}), {"rotor", "'disc'"});
   check_message(error_of(points + "[[probe]]\nname = \"p\"\non = \"pda\"\ndirection = \"x\"\n", {}), {"'pad'"});

