@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <Eigen/Dense>
+#include <set>
 
 namespace squeal
 {
@@ -14,7 +15,8 @@ namespace
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// The way to the end of a step of the path, with bolts of given shortenings there.
+/// The way to the end of a step of the path, with bolts of given shortenings there: those that it tightens, and those
+/// of later steps, which carry nothing yet.
 class StepOfBolts
 {
 public:
@@ -22,7 +24,15 @@ public:
       : structure_(structure), interface_(interface), equilibria_(equilibria), step_(structure.path[step]),
         loose_(copy_of(structure.path[step].load.get()))
   {
-    for (const std::size_t bolt : step_.bolts)
+    std::set<std::size_t> tightened;
+    for (std::size_t i = 0; i < step; ++i)
+      tightened.insert(structure.path[i].bolts.begin(), structure.path[i].bolts.end());
+    tightened.insert(step_.bolts.begin(), step_.bolts.end());
+    bolts_ = step_.bolts;
+    for (std::size_t later = step + 1; later < structure.path.size(); ++later)
+      for (const std::size_t bolt : structure.path[later].bolts)
+        if (tightened.insert(bolt).second) bolts_.push_back(bolt);
+    for (const std::size_t bolt : bolts_)
       check(VecAXPY(loose_, -structure.bolts[bolt].shortening, structure.bolts[bolt].pull));
     to_here_.K = shared(structure.K.get());
     to_here_.M = shared(structure.M.get());
@@ -34,7 +44,10 @@ public:
     to_here_.path.push_back({step_.name, shared(to_here_.load.get()), step_.driven_friction, {}});
   }
 
-  const std::vector<std::size_t>& bolts() const { return step_.bolts; }
+  Index bolts() const { return static_cast<Index>(bolts_.size()); }
+
+  /// The tension of a bolt at the end of the step [N].
+  double wanted(Index i) { return i < static_cast<Index>(step_.bolts.size()) ? bolt_at(i).tension : 0; }
 
   /// Sum of what the tension of each bolt lacks [N], at shortenings x.
   VectorXd missing(const VectorXd& x)
@@ -51,18 +64,19 @@ public:
       throw Error("bolt " + bolt_at(0).name + ": no equilibrium while it is tightened in step '" + step_.name +
                   "': " + found.outcome.reason);
     VectorXd result(x.size());
-    for (Index i = 0; i < x.size(); ++i) result(i) = bolt_at(i).tension - tension_of(bolt_at(i), found.u);
+    for (Index i = 0; i < x.size(); ++i) result(i) = wanted(i) - tension_of(bolt_at(i), found.u);
     return result;
   }
 
-  TightBolt& bolt_at(Index i) { return structure_.bolts[step_.bolts[static_cast<std::size_t>(i)]]; }
+  TightBolt& bolt_at(Index i) { return structure_.bolts[bolts_[static_cast<std::size_t>(i)]]; }
 
 private:
   Structure& structure_;
   const Interface& interface_;
   Equilibria& equilibria_;
   const PathStep& step_;
-  Owned<Vec> loose_;  // load at the end of the step without the bolts that it tightens
+  std::vector<std::size_t> bolts_;
+  Owned<Vec> loose_;  // load at the end of the step without these bolts
   Structure to_here_; // as far as equilibria need it
 };
 
@@ -74,7 +88,7 @@ Eigen::MatrixXd slopes_at(StepOfBolts& step, const VectorXd& x, const VectorXd& 
   for (Index i = 0; i < x.size(); ++i)
   {
     VectorXd beside = x;
-    beside(i) *= 1 + part;
+    beside(i) += part * step.bolt_at(i).tension / step.bolt_at(i).stiffness;
     slopes.col(i) = (missing - step.missing(beside)) / (beside(i) - x(i));
   }
   return slopes;
@@ -85,12 +99,11 @@ VectorXd shortenings(StepOfBolts& step)
 {
   constexpr int most = 20;
   constexpr double enough = 1e-11; // of the tension: what equilibria are found to
-  const auto count = static_cast<Index>(step.bolts().size());
-  VectorXd x(count), tension(count);
-  for (Index i = 0; i < count; ++i)
+  VectorXd x(step.bolts()), tension(step.bolts());
+  for (Index i = 0; i < x.size(); ++i)
   {
     tension(i) = step.bolt_at(i).tension;
-    x(i) = tension(i) / step.bolt_at(i).stiffness; // if all but the section were rigid
+    x(i) = step.wanted(i) / step.bolt_at(i).stiffness; // if all but the section were rigid
   }
   VectorXd missing = step.missing(x);
   for (int pass = 0; pass < most && (missing.array().abs() > enough * tension.array()).any(); ++pass)
@@ -116,7 +129,7 @@ void tighten(Structure& structure, const Interface& interface)
     if (structure.path[step].bolts.empty()) continue;
     StepOfBolts here(structure, interface, equilibria, step);
     std::vector<double> before;
-    for (const std::size_t bolt : here.bolts()) before.push_back(structure.bolts[bolt].shortening);
+    for (Index i = 0; i < here.bolts(); ++i) before.push_back(here.bolt_at(i).shortening);
     const VectorXd found = shortenings(here);
     for (Index i = 0; i < found.size(); ++i)
       for (std::size_t later = step; later < structure.path.size(); ++later)

@@ -80,7 +80,7 @@ def write(tmp_path):
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
 def test_a_bolt_takes_its_share_of_a_load_once_it_is_locked(write, converged, ranks):
-    at_head = {X: (20000 - 0.8 * X, 20000 + 0.2 * X) for X in (5000, 20000, 24900)} | {25100: (0, 25100), 40000: (0, 40000)}
+    at_head = {X: (20000 - 0.8 * X, 20000 + 0.2 * X) for X in (5000, 20000, 24900)} | {30000: (0, 30000), 40000: (0, 40000)}
     cases = [(FORCE.format(on="head", value=X), *expected) for X, expected in at_head.items()]
     cases.append((FORCE.format(on="upper", value=5000) + FORCE.format(on="lower", value=-5000), 15000, 20000))
     cases.append((FORCE.format(on="head", value=5000) + AS_FORCE, 15000, 20000))

@@ -199,7 +199,8 @@ UNLESS_STABLE |= {f"coarse.{key}" for key in ("dofs", "pairs", "residual", "freq
 OF_SOME_BRANCHES = re.compile(r"branch\.((events|coexistence)\[\]\.\w+|reduction\..+|points\[\]\.full_residual|not_reduced)")
 # Written of pairs without a drive, which test_undriven and test_joint_cycles read.
 UNLESS_STABLE |= {f"equilibrium.undriven_pairs.{key}" for key in ("stick", "slip", "open", "at_limit", "increments", "change", "index",
-                                                                  "reciprocal_condition")} | {"transient.joint_work[]", "modes.dependent_rows", "estimate.slip_amplitude"}
+                                                                  "reciprocal_condition")} | {"transient.joint_work[]", "modes.dependent_rows", "estimate.slip_amplitude",
+                                                                  *(f"equilibrium.bolts[].{key}" for key in ("name", "shortening", "tension"))}
 UNLESS_STABLE |= {f"cycle.joints.{key}" for key in ("held", "slipping", "largest_use", "at_edge", "work[]", *(f"offsets[].{key}" for key in (
     "contact", "direction", "least", "greatest", "period_by_offset", "energy_by_offset")))} | {"cycle.multipliers.offsets_held"}
 
