@@ -162,26 +162,6 @@ def test_a_guide_pin_bends_and_swings_as_a_beam(write, converged, ranks):
         assert pair == pytest.approx((frequency, frequency), rel=rotary)
 
 
-def test_a_moved_support_bends_the_pin(write, converged):
-    """The tip is moved across the pin in a turned frame; its reaction is 3 E I/L^3 times that, which a spring shows."""
-    more = """
-[[support]]
-on = "tip"
-fixed = "y"
-axis_1 = [0.6, 0, 0.8]
-axis_2 = [0.8, 0, -0.6]
-displacement = [0, 1e-3, 0]
-[[support]]
-on = "tip"
-fixed = "x"
-axis_1 = [0.6, 0, 0.8]
-axis_2 = [0.8, 0, -0.6]
-"""
-    scene = BEAM.format(tip=[0.18, 0, 0.24], across=[0.8, 0, -0.6], shear=0, more=more)
-    report = converged(write(scene)).report
-    assert report["equilibrium"]["probes"]["tip"] == pytest.approx(1e-3, rel=1e-12)
-
-
 def test_a_bushing_and_a_hinge_have_their_frequencies(write, converged):
     """A body on a bushing to the ground swings at sqrt(k/m) along its axes; a hinge leaves it one pendulum."""
     body = """
