@@ -139,11 +139,24 @@ StickSlipOperator make_stick_slip_operator(MatrixXd N, MatrixXd M, int direction
   return result;
 }
 
+namespace
+{
+
+/// The smallest pivot over the largest.
+double pivot_ratio(const Eigen::PartialPivLU<MatrixXd>& factors)
+{
+  const VectorXd pivots = factors.matrixLU().diagonal().cwiseAbs();
+  return pivots.minCoeff() / pivots.maxCoeff();
+}
+
+} // namespace
+
 std::optional<DividedOperator> divided(StickSlipOperator& of)
 {
   constexpr double dependent = 1e-8; // forces would lose as many digits
   Eigen::PartialPivLU<MatrixXd> by(of.M);
-  if (!(by.rcond() > dependent)) return std::nullopt;
+  // a pivot of zero has no estimate of the condition
+  if (!(pivot_ratio(by) > dependent && by.rcond() > dependent)) return std::nullopt;
   of.N = by.solve(of.N).eval();
   of.M.resize(0, 0);
   return DividedOperator{std::move(of), std::move(by)};
@@ -309,9 +322,7 @@ int StatusSystem::index() const
 
 double StatusSystem::reciprocal_condition() const
 {
-  if (unknown_.empty()) return 1;
-  const VectorXd pivots = factors_.matrixLU().diagonal().cwiseAbs();
-  return pivots.minCoeff() / pivots.maxCoeff();
+  return unknown_.empty() ? 1 : pivot_ratio(factors_);
 }
 
 namespace

@@ -115,3 +115,27 @@ TEST_CASE("a small motion about a joint that has slipped grows as with the joint
   model.interface.friction.common.slipped_pairs_stick = false;
   CHECK(largest_growth(model, rest) < -.01); // the wrong word: along its last friction it slides one way only
 }
+
+TEST_CASE("the other sense of the drive gives the mirrored answer, and the path anew the same one")
+{
+  // a pad between two brackets: motions pad x, y, disc y, brackets x
+  const auto found_with = [](double speed)
+  {
+    SmallModel model;
+    const Rows K = test::diagonal({0, 0, 5e7, 3e7, 3e7});
+    model.structure = test::make_structure(test::diagonal({1, 1, 1, 1, 1}), test::zeros(5, 5), K, {0, -1000, 0, 0, 0});
+    model.interface = test::make_interface(
+        {{0, 1, -1, 0, 0}, {1, 0, 0, 0, 0}, {-1, 0, 0, 1, 0}, {0, 1, 0, 0, 0}, {1, 0, 0, 0, -1}, {0, 1, 0, 0, 0}}, 1,
+        {0, 0, 0}, {speed, 0, 0}, 0.4, model.structure.K);
+    Equilibria equilibria{EquilibriumOptions{}};
+    const Equilibrium first = equilibria.at(model.structure, model.interface),
+                      again = equilibria.at(model.structure, model.interface);
+    CHECK(first.outcome.kind == OutcomeKind::converged);
+    CHECK(first.reactions == again.reactions);
+    return first.reactions;
+  };
+  const std::vector<double> forth = found_with(1), back = found_with(-1);
+  CHECK(forth[0] == doctest::Approx(1000 / 1.16).epsilon(1e-9));
+  const std::vector<double> mirrored = {back[0], -back[1], back[4], back[5], back[2], back[3]};
+  for (std::size_t i = 0; i < forth.size(); ++i) CHECK(std::abs(forth[i] - mirrored[i]) < 1e-9 * 1000);
+}
