@@ -81,11 +81,4 @@ void share_loads(const Structure& own, Structure& structure)
   structure.path = sharing(own.path);
 }
 
-bool has_preload(const Scene& scene)
-{
-  const auto moves = [](const Support& support)
-  { return support.displacement != Vec3{} || support.rotation != Vec3{}; };
-  return !scene.bolts.empty() || scene.gravity != Vec3{} || std::ranges::any_of(scene.supports, moves);
-}
-
 } // namespace squeal

@@ -89,14 +89,21 @@ std::vector<Estimate> estimates_at(const SlidingPoint& point, const Scene& scene
   return estimates;
 }
 
-/// Whether a mode grows, and a trajectory of the model costs little.
-bool may_lead_elsewhere(const SlidingPoint& point)
-{
-  constexpr double steps = 400 * 256; // of periods, steps a period
-  return point.modes.unstable_count > 0 && steps * work_of_step(point.model->structure) <= affordable_work;
-}
-
 } // namespace
+
+std::optional<int> starts_sought(const SlidingPoint& point, const Scene& scene)
+{
+  constexpr int random = 5, together = 16; // random sums; trajectories that are integrated together at most
+  constexpr double of_start = 400 * 256;   // steps, of periods and steps a period
+  if (!scene.cycle.enabled) return std::nullopt;
+  if (scene.cycle.starts > 0) return scene.cycle.starts;
+  const auto oscillates = [](const ComplexMode& mode) { return mode.frequency_hz() > 0; };
+  const int unstable = point.modes.unstable_count;
+  const bool several = std::ranges::count_if(point.modes.unstable(), oscillates) > 1;
+  const int starts = several ? std::min(unstable * (unstable + 1) / 2 + random, together) : 0;
+  const double work = (starts + 1) * of_start * work_of_step(point.model->structure);
+  return unstable > 0 && work <= affordable_work ? std::optional(starts) : std::nullopt;
+}
 
 SlidingPoint find_sliding(const Model& model, const ProgramOptions& options, const StageRunner& run)
 {
@@ -192,7 +199,7 @@ std::string why_off(Stage which, const SlidingPoint& point, const Scene& scene)
   case Stage::cycle:
     return unless(scene.cycle.enabled, "the scene has no [cycle], or turns it off");
   case Stage::attractors:
-    return unless(scene.cycle.enabled && (scene.cycle.starts > 0 || may_lead_elsewhere(point)),
+    return unless(starts_sought(point, scene).has_value(),
                   "cycle.starts is 0, and no other starts are sought by themselves");
   case Stage::branch:
     return unless(scene.branch.has_value(), "the scene has no [branch]");

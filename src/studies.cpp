@@ -22,29 +22,6 @@ Response run_response(const SlidingPoint& point, const Scene& scene, const Progr
                         frequencies_of(*scene.response), options.response, options.modes.pencil});
 }
 
-namespace
-{
-
-/// Where several modes oscillate and grow, each of which may lead to a motion of its own: the modes, their pairs and
-/// five random sums; as many as are integrated together at most. Else none.
-int starts_beside(const SlidingPoint& point)
-{
-  constexpr int random = 5, together = 16;
-  const auto oscillates = [](const ComplexMode& mode) { return mode.frequency_hz() > 0; };
-  const int unstable = point.modes.unstable_count;
-  if (std::ranges::count_if(point.modes.unstable(), oscillates) < 2) return 0;
-  return std::min(unstable * (unstable + 1) / 2 + random, together);
-}
-
-/// Whether so many trajectories of the model and a small one cost little.
-bool are_affordable(const SlidingPoint& point, int starts)
-{
-  constexpr double steps = 400 * 256; // of periods each, steps a period
-  return (starts + 1) * steps * work_of_step(point.model->structure) <= affordable_work;
-}
-
-} // namespace
-
 Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const Scene& scene,
                           const ProgramOptions& options)
 {
@@ -54,9 +31,7 @@ Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const
     settings.steps_per_period = std::clamp(motion.cycle.steps_per_period, first_steps, enough);
   const std::vector<ComplexMode>& modes = point.modes.modes;
   const bool chosen = settings.starts == 0;
-  if (chosen) settings.starts = starts_beside(point);
-  if (!settings.enabled || (chosen && (point.modes.unstable_count == 0 || !are_affordable(point, settings.starts))))
-    return not_run<Attractors>(OutcomeKind::off, "cycle.starts is 0, and no other starts are sought by themselves");
+  settings.starts = starts_sought(point, scene).value_or(0);
   const auto attractors = [&](const UnstableModes& started)
   {
     Attractors found = find_attractors({point.sliding(), modes, started, settings, options.step, chosen});

@@ -21,7 +21,4 @@ std::vector<PathStep> path_of_mesh(const Structure& structure, const Scene& scen
 /// Shares load, preload, bolts and path.
 void share_loads(const Structure& own, Structure& structure);
 
-/// Whether part of the load depends on stiffness, mass or contact.
-bool has_preload(const Scene& scene);
-
 } // namespace squeal

@@ -89,8 +89,8 @@ SQUEAL_SIMD void add_products(ColumnsOf which, const PairedRows& matrices, std::
                : add_lanes<ColumnsOf::others, 1>(matrices, lanes, x, y);
 }
 
-/// The same, or one trajectory of both: without fused products K u of a body that moves without strain is then zero to
-/// the last bit.
+/// Both products, or one trajectory of both: without fused products K u of a body that moves without strain is then
+/// zero to the last bit.
 template <ColumnsOf which>
 void add(const PairedRows& matrices, std::size_t parts, std::size_t lanes, const double* x, double* y)
 {

@@ -186,7 +186,7 @@ Attractors find_attractors(const AttractorProblem& problem)
   const bool settled = all_settled(motions, std::numeric_limits<long>::max());
   found.motions = joined(std::move(motions));
   add_step_errors(problem, swarm, found.motions);
-  found.motions = joined(std::move(found.motions)); // which the error of the step may have told apart
+  found.motions = joined(std::move(found.motions)); // motions that differ by less than these errors
   found.outcome = {settled ? OutcomeKind::completed : OutcomeKind::not_converged,
                    settled ? "" : format("some motions had not settled after %ld periods", found.periods), 0, 0};
   return found;

@@ -239,7 +239,7 @@ std::optional<StatusSolution> solution_of(const ComplementarityProblem& problem,
                         std::move(solver)};
 }
 
-/// By Lemke's path from a split, and by trying every split of few pairs.
+/// The solution by Lemke's path from a split, or by trying every split of few pairs.
 StatusSolution solve_by_pivoting(const ComplementarityProblem& problem, std::vector<char> closed)
 {
   constexpr std::size_t few = 12; // pairs: 4096 splits, which take less than the path of a thousand pairs

@@ -36,7 +36,7 @@ struct ContactWork
   }
 };
 
-/// Of each contact.
+/// The largest reaction of each contact.
 Scales largest_reactions(const ContactWork& work);
 
 /// By how much the law of a pair with the velocity w is missed, over the scale of its forces; `largest`: reaction of

@@ -23,7 +23,7 @@ std::vector<MovedPairs> movable(const Interface& interface, const std::vector<ch
   for (std::size_t i = 0; i < held.size(); ++i)
     for (int k = 0; held[i] && k < interface.directions; ++k)
     {
-      const int contact = interface.geometry.empty() ? 0 : interface.geometry[i].contact;
+      const auto contact = static_cast<int>(interface.friction.contact_of(i));
       const auto known = std::ranges::find_if(all, [&](const MovedPairs& one)
                                               { return one.contact == contact && one.direction == k; });
       (known == all.end() ? all.emplace_back(MovedPairs{{}, contact, k}) : *known).pairs.push_back(i);

@@ -51,8 +51,9 @@ std::vector<PathEnd> ends_of(const PathOperators& operators, const Structure& st
 
 std::vector<int> contacts_of(const Interface& interface)
 {
-  std::vector<int> contact(interface.gap.size(), 0);
-  for (std::size_t i = 0; i < interface.geometry.size(); ++i) contact[i] = interface.geometry[i].contact;
+  std::vector<int> contact;
+  for (std::size_t i = 0; i < interface.gap.size(); ++i)
+    contact.push_back(static_cast<int>(interface.friction.contact_of(i)));
   return contact;
 }
 

@@ -132,11 +132,12 @@ void tighten(Structure& structure, const Interface& interface)
     for (Index i = 0; i < here.bolts(); ++i) before.push_back(here.bolt_at(i).shortening);
     const VectorXd found = shortenings(here);
     for (Index i = 0; i < found.size(); ++i)
+    {
+      const double more = found(i) - before[static_cast<std::size_t>(i)];
       for (std::size_t later = step; later < structure.path.size(); ++later)
-        check(
-            VecAXPY(structure.path[later].load, found(i) - before[static_cast<std::size_t>(i)], here.bolt_at(i).pull));
-    for (Index i = 0; i < found.size(); ++i)
-      check(VecAXPY(structure.preload, found(i) - before[static_cast<std::size_t>(i)], here.bolt_at(i).pull));
+        check(VecAXPY(structure.path[later].load, more, here.bolt_at(i).pull));
+      check(VecAXPY(structure.preload, more, here.bolt_at(i).pull));
+    }
   }
 }
 

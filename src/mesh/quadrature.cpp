@@ -13,12 +13,6 @@ namespace squeal
 namespace
 {
 
-/// A point of a rule in one dimension, on [-1, 1].
-struct LinePoint
-{
-  double x, weight;
-};
-
 /// A point of a rule in two or three dimensions.
 struct RulePoint
 {
@@ -28,7 +22,8 @@ struct RulePoint
 
 using Rule = std::vector<RulePoint>;
 
-/// Gauss-Legendre rule of n = 2, 3 or 4 points; it is exact to degree 2 n - 1.
+} // namespace
+
 std::vector<LinePoint> gauss(int n)
 {
   if (n == 2) return {{-std::sqrt(1. / 3), 1}, {std::sqrt(1. / 3), 1}};
@@ -37,6 +32,9 @@ std::vector<LinePoint> gauss(int n)
   const double inner_weight = (18 + std::sqrt(30.)) / 36, outer_weight = (18 - std::sqrt(30.)) / 36;
   return {{-outer, outer_weight}, {-inner, inner_weight}, {inner, inner_weight}, {outer, outer_weight}};
 }
+
+namespace
+{
 
 Rule square(int n)
 {

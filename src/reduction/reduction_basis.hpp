@@ -18,7 +18,7 @@ struct ModeColumns
 };
 
 /// The followed mode is the first; the others nearest to it in frequency. Real and imaginary parts. Then real modes.
-/// Those kept apart are the last ones. All as motions Z y that keep the eliminated pairs closed.
+/// Shapes kept apart are the last ones. All as motions Z y that keep the eliminated pairs closed.
 ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction,
                          const ClosedContact& contact);
 

@@ -235,7 +235,7 @@ std::vector<Index> local_pivots(const ClosedContact& contact)
 namespace
 {
 
-/// Of so many local rows, those of no pivot.
+/// The rows of no pivot among so many local ones.
 std::vector<Index> rows_kept(const ClosedContact& contact, Index rows)
 {
   std::vector<Index> kept;

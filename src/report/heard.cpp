@@ -183,7 +183,7 @@ std::string starts_text(const Report& report)
                 other->starts.size(), elsewhere.c_str());
 }
 
-/// By how much the step may be off, where that is more than was asked.
+/// The error that the step may leave, where that is more than was asked.
 std::string missed_accuracy(const Fidelity& fidelity)
 {
   const double error = std::max(fidelity.step_frequency_error, fidelity.step_energy_error);

@@ -1,7 +1,6 @@
 /// Checks of a scene that involve several keys: tables that exclude each other, undefined or repeated names, numbers
 /// that contradict each other.
-#include "squeal/base/error.hpp"
-#include "toml_values.hpp"
+#include "scene_checker.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,16 +12,10 @@ namespace squeal
 namespace
 {
 
-/// Checks of one scene; each throws Error with the place of the wrong value.
-class Checker
+class Checker : SceneChecker
 {
 public:
-  Checker(const Scene& scene, const Places& places)
-      : scene_(scene), places_(places), points_(names_of(scene.points)), nodes_(points_)
-  {
-    for (const auto& names : {names_of(scene.rigid_bodies), names_of(scene.couplings)})
-      nodes_.insert(nodes_.end(), names.begin(), names.end());
-  }
+  Checker(const Scene& scene, const Places& places) : SceneChecker(scene, places) {}
 
   void check_all() const
   {
@@ -57,11 +50,6 @@ public:
   }
 
 private:
-  [[noreturn]] void fail(const void* member, const std::string& text) const
-  {
-    throw Error(places_.at(member) + ": " + text);
-  }
-
   /// Throws Error if a list that excludes another is not empty.
   template <class T> void refuse(const std::vector<T>& list, const std::string& key, const std::string& why) const
   {
@@ -147,14 +135,6 @@ private:
     need_different(scene_.bolts, "bolt", bolts);
     need_different(scene_.superelements, "superelement", superelements);
     need_different(scene_.probes, "probe", probes);
-  }
-
-  /// Throws Error if a name is not known.
-  void need_known(const std::string& name, const std::vector<std::string>& known, const void* member,
-                  const std::string& key) const
-  {
-    if (std::find(known.begin(), known.end(), name) == known.end())
-      fail(member, key + " = \"" + name + "\" is not defined" + hint_or_list(name, known));
   }
 
   void check_material(const Part& part) const
@@ -418,12 +398,6 @@ private:
     if (!(r.from < r.to))
       fail(&r.to, format("[response] goes from %g to %g Hz: give a 'to' above 'from'", r.from, r.to));
   }
-
-  static constexpr double largest_cosine = 1e-6; // unit vectors written by hand have a few digits
-
-  const Scene& scene_;
-  const Places& places_;
-  std::vector<std::string> points_, nodes_; // names; nodes: of rigid bodies and couplings, too
 };
 
 } // namespace

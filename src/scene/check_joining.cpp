@@ -1,8 +1,7 @@
-/// Checks of what joins bodies, of the frames of supports and of loss factors, which involve several keys.
-#include "squeal/base/error.hpp"
-#include "toml_values.hpp"
+/// Checks of couplings, connectors, beams, masses and bolts, of the frames of supports and of loss factors, which
+/// involve several keys.
+#include "scene_checker.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -12,16 +11,10 @@ namespace squeal
 namespace
 {
 
-/// Checks of one scene; each throws Error with the place of the wrong value.
-class JoiningChecker
+class JoiningChecker : SceneChecker
 {
 public:
-  JoiningChecker(const Scene& scene, const Places& places) : scene_(scene), places_(places)
-  {
-    for (const Point& point : scene.points) nodes_.push_back(point.name);
-    for (const RigidBody& body : scene.rigid_bodies) nodes_.push_back(body.name);
-    for (const Coupling& coupling : scene.couplings) nodes_.push_back(coupling.name);
-  }
+  JoiningChecker(const Scene& scene, const Places& places) : SceneChecker(scene, places) {}
 
   void check_all() const
   {
@@ -39,21 +32,8 @@ public:
   }
 
 private:
-  [[noreturn]] void fail(const void* member, const std::string& text) const
-  {
-    throw Error(places_.at(member) + ": " + text);
-  }
-
-  void need_known(const std::string& name, const std::vector<std::string>& known, const void* member,
-                  const std::string& key) const
-  {
-    if (std::ranges::find(known, name) == known.end())
-      fail(member, key + " = \"" + name + "\" is not defined" + hint_or_list(name, known));
-  }
-
   void check_axes(const Frame& frame, const std::string& label) const
   {
-    constexpr double largest_cosine = 1e-6; // unit vectors written by hand have a few digits
     if (std::abs(dot(frame.axis_1, frame.axis_2)) > largest_cosine)
       fail(&frame.axis_2, label + "axis_2 must be square to axis_1");
     if (frame.cylinder && (frame.axis_1 != Frame{}.axis_1 || frame.axis_2 != Frame{}.axis_2))
@@ -73,9 +53,7 @@ private:
     };
     need_fixed(support.displacement, 0, "displacement");
     need_fixed(support.rotation, 3, "rotation");
-    const bool plain = support.displacement == Vec3{} && support.rotation == Vec3{} && !support.frame.cylinder &&
-                       support.frame.axis_1 == Frame{}.axis_1 && support.frame.axis_2 == Frame{}.axis_2;
-    if (scene_.matrices && !plain)
+    if (scene_.matrices && !is_plain(support))
       fail(&support, label + "of a matrix scene holds rows as they are: take axes, displacement and rotation out");
   }
 
@@ -95,10 +73,8 @@ private:
       fail(&coupling.weights, "[[coupling]] " + coupling.name + " weights holds " +
                                   std::to_string(coupling.weights.size()) + " numbers for " +
                                   std::to_string(coupling.on.size()) + " groups: give one each");
-    std::vector<std::string> points;
-    for (const Point& point : scene_.points) points.push_back(point.name);
     for (const std::string& on : coupling.on)
-      if (!scene_.mesh) need_known(on, points, &coupling.on, "[[coupling]] on");
+      if (!scene_.mesh) need_known(on, points_, &coupling.on, "[[coupling]] on");
   }
 
   void check_matrix(const std::vector<double>& values, const std::string& label) const
@@ -142,9 +118,7 @@ private:
   {
     const std::string label = "[[bolt]] " + bolt.name + " ";
     if (bolt.section.empty() == bolt.beam.empty()) fail(&bolt, label + "needs one of the keys 'section' and 'beam'");
-    std::vector<std::string> beams;
-    for (const Beam& beam : scene_.beams) beams.push_back(beam.name);
-    if (!bolt.beam.empty()) need_known(bolt.beam, beams, &bolt.beam, label + "beam");
+    if (!bolt.beam.empty()) need_known(bolt.beam, names_of(scene_.beams), &bolt.beam, label + "beam");
     if (!bolt.section.empty() && !scene_.mesh) fail(&bolt.section, label + "section needs a [mesh]; name a beam");
     if (!bolt.section.empty() && bolt.axis == Vec3{})
       fail(&bolt, label + "needs the key 'axis', the direction of the shank at the section");
@@ -153,10 +127,7 @@ private:
   /// Nothing loads a structure at rest, and no load factor scales a preload.
   void check_rest() const
   {
-    const auto moves = [](const Support& s) { return s.displacement != Vec3{} || s.rotation != Vec3{}; };
-    const bool preloaded =
-        !scene_.bolts.empty() || scene_.gravity != Vec3{} || std::ranges::any_of(scene_.supports, moves);
-    if (preloaded && scene_.transient.enabled && scene_.transient.start.kind == StartKind::rest)
+    if (has_preload(scene_) && scene_.transient.enabled && scene_.transient.start.kind == StartKind::rest)
       fail(&scene_.transient.start,
            "[transient] start = \"rest\" is a structure that nothing loads: bolts, gravity and "
            "moved supports would let it jump; start from the equilibrium");
@@ -164,8 +135,7 @@ private:
 
   void check_steps() const
   {
-    std::vector<std::string> known;
-    for (const Bolt& bolt : scene_.bolts) known.push_back(bolt.name);
+    const std::vector<std::string> known = names_of(scene_.bolts);
     std::set<std::string> tightened;
     for (const LoadStep& step : scene_.steps)
       for (const std::string& name : step.bolts)
@@ -215,10 +185,6 @@ private:
     else
       return "[[" + table + "]] from " + entry.from + " to " + entry.to;
   }
-
-  const Scene& scene_;
-  const Places& places_;
-  std::vector<std::string> nodes_; // names of points, rigid bodies and couplings
 };
 
 } // namespace

@@ -189,4 +189,10 @@ Scene read_scene(const std::filesystem::path& file, const std::vector<std::strin
   return scene;
 }
 
+bool has_preload(const Scene& scene)
+{
+  return !scene.bolts.empty() || scene.gravity != Vec3{} ||
+         std::ranges::any_of(scene.supports, [](const Support& support) { return moves(support); });
+}
+
 } // namespace squeal

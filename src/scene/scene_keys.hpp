@@ -170,7 +170,7 @@ template <class Entry> std::vector<std::string> names_of(const std::vector<Entry
 /// Throws Error on contradictions between keys: undefined or repeated names, tables that exclude each other.
 void check_scene(const Scene& scene, const Places& places);
 
-/// Of what joins bodies, of the frames of supports and of loss factors.
+/// Throws Error on contradictions in what joins bodies, in the frames of supports and in loss factors.
 void check_joining(const Scene& scene, const Places& places);
 
 /// Gives undriven contacts without a friction of their own that of the scene, which sweeps then change elsewhere alone.

@@ -6,6 +6,7 @@
 #include "beam_kernel.hpp"
 
 #include "squeal/base/constants.hpp"
+#include "squeal/mesh/quadrature.hpp"
 
 #include <array>
 #include <cmath>
@@ -76,8 +77,6 @@ double shear_number(const BeamSection& s, double inertia, double L)
 ElementMatrices beam_matrices(const Vec3& a, const Vec3& b, const Vec3& axis_2, const BeamSection& s)
 {
   constexpr std::array<int, 4> along_2 = {1, 5, 7, 11}, along_3 = {2, 4, 8, 10};
-  const double far = std::sqrt(3. / 7 + 2. / 7 * std::sqrt(1.2)), near = std::sqrt(3. / 7 - 2. / 7 * std::sqrt(1.2)),
-               w_far = (18 - std::sqrt(30.)) / 72, w_near = (18 + std::sqrt(30.)) / 72;
   const Eigen::Vector3d span(Vec3(b - a).data());
   const double L = span.norm(), kGA = s.shear_factor * s.shear * s.area;
   const double phi_2 = shear_number(s, s.bending_2, L), phi_3 = shear_number(s, s.bending_3, L);
@@ -86,10 +85,9 @@ ElementMatrices beam_matrices(const Vec3& a, const Vec3& b, const Vec3& axis_2, 
   Eigen::Vector<double, 6> mass{s.area, s.area, s.area, s.bending_2 + s.bending_3, s.bending_3, s.bending_2};
   mass *= s.density;
   ElementMatrices local{Eigen::MatrixXd::Zero(12, 12), Eigen::MatrixXd::Zero(12, 12)};
-  for (const auto& [at, weight] :
-       {std::pair{-far, w_far}, std::pair{-near, w_near}, std::pair{near, w_near}, std::pair{far, w_far}})
+  for (const LinePoint& point : gauss(4))
   {
-    const double xi = (1 + at) / 2;
+    const double xi = (1 + point.x) / 2, length = point.weight * L / 2;
     Rows motion = Rows::Zero(), strain = Rows::Zero();
     for (const int first : {0, 3})
     {
@@ -107,8 +105,8 @@ ElementMatrices beam_matrices(const Vec3& a, const Vec3& b, const Vec3& axis_2, 
     put(motion, 4, along_3, -in_3.rotation, -1);
     put(strain, 2, along_3, in_3.shear, -1);
     put(strain, 4, along_3, -in_3.curvature, -1);
-    local.mass += weight * L * motion.transpose() * mass.asDiagonal() * motion;
-    local.stiffness += weight * L * strain.transpose() * stiffness.asDiagonal() * strain;
+    local.mass += length * motion.transpose() * mass.asDiagonal() * motion;
+    local.stiffness += length * strain.transpose() * stiffness.asDiagonal() * strain;
   }
   const Eigen::Matrix3d axes = axes_of(span / L, axis_2);
   Eigen::MatrixXd turn = Eigen::MatrixXd::Zero(12, 12);

@@ -138,21 +138,16 @@ void hold_node(Constraints& constraints, const Mesh& mesh, const Support& suppor
 
 void lock(Constraints& constraints, const Mesh& mesh, const Connector& connector)
 {
-  const std::string user = "connector from " + connector.from + " to " + connector.to;
-  const Joined joined = joined_by(connector, mesh);
-  std::vector<Vec3> ends;
-  for (const int node : joined.nodes) ends.push_back(mesh.nodes[node]);
-  const Eigen::MatrixXd rows =
-      twice(axes_at(connector.frame, joined.at, user)).transpose() * relative_motion(joined.at, ends);
+  const auto [nodes, rows] = relative_motion(connector, mesh);
   for (int motion = 0; motion < 6; ++motion)
   {
     if (!connector.locked[static_cast<std::size_t>(motion)]) continue;
     ConstraintRow row;
     for (Eigen::Index k = 0; k < rows.cols(); ++k)
       if (rows(motion, k) != 0)
-        row.terms.push_back({6 * PetscInt{joined.nodes[static_cast<std::size_t>(k / 6)]} + static_cast<PetscInt>(k % 6),
-                             rows(motion, k)});
-    add_row(constraints, row, user + ": its locked " + motion_words[static_cast<std::size_t>(motion)]);
+        row.terms.push_back(
+            {6 * PetscInt{nodes[static_cast<std::size_t>(k / 6)]} + static_cast<PetscInt>(k % 6), rows(motion, k)});
+    add_row(constraints, row, label_of(connector) + ": its locked " + motion_words[static_cast<std::size_t>(motion)]);
   }
 }
 
@@ -175,31 +170,31 @@ void make_dependent(Constraints& constraints, PetscInt nodal_dof, std::vector<Co
   constraints.dependent[nodal_dof] = std::move(terms);
 }
 
-Eigen::MatrixXd relative_motion(const Vec3& at, const std::vector<Vec3>& ends)
+RelativeMotion relative_motion(const Connector& connector, const Mesh& mesh)
 {
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(6, 6 * static_cast<Eigen::Index>(ends.size()));
-  for (std::size_t i = 0; i < ends.size(); ++i)
+  RelativeMotion result;
+  for (const std::string& name : {connector.from, connector.to})
+    if (name != ground) result.nodes.push_back(point_node(mesh, name, label_of(connector)));
+  const auto count = static_cast<Eigen::Index>(result.nodes.size());
+  Vec3 at = connector.at.value_or(Vec3{});
+  if (!connector.at)
+    for (const int node : result.nodes) at = at + 1. / static_cast<double>(count) * mesh.nodes[node];
+  result.rows = Eigen::MatrixXd::Zero(6, 6 * count);
+  for (Eigen::Index i = 0; i < count; ++i)
   {
-    const double sign = i + 1 == ends.size() && i > 0 ? 1 : -1;
-    auto block = rows.middleCols<6>(6 * static_cast<Eigen::Index>(i));
+    const double sign = i == 1 ? 1 : -1;
+    auto block = result.rows.middleCols<6>(6 * i);
     block.diagonal().setConstant(sign);
-    block.topRightCorner<3, 3>() = -sign * cross_matrix(as_eigen(at - ends[i]));
+    block.topRightCorner<3, 3>() =
+        -sign * cross_matrix(as_eigen(at - mesh.nodes[result.nodes[static_cast<std::size_t>(i)]]));
   }
-  return rows;
+  result.rows = (twice(axes_at(connector.frame, at, label_of(connector))).transpose() * result.rows).eval();
+  return result;
 }
 
-Joined joined_by(const Connector& connector, const Mesh& mesh)
+std::string label_of(const Connector& connector)
 {
-  const std::string user = "connector from " + connector.from + " to " + connector.to;
-  Joined joined;
-  for (const std::string& name : {connector.from, connector.to})
-    if (name != ground) joined.nodes.push_back(point_node(mesh, name, user));
-  if (connector.at)
-    joined.at = *connector.at;
-  else
-    for (const int node : joined.nodes)
-      joined.at = joined.at + 1. / static_cast<double>(joined.nodes.size()) * mesh.nodes[node];
-  return joined;
+  return "connector from " + connector.from + " to " + connector.to;
 }
 
 void add_couplings(Constraints& constraints, const Mesh& mesh, const std::vector<Coupling>& couplings)
@@ -213,12 +208,6 @@ void add_rows(Constraints& constraints, const Mesh& mesh, const Scene& scene)
     if (!is_plain(support))
       for (const int node : named_nodes(mesh, support.on, "support")) hold_node(constraints, mesh, support, node);
   for (const Connector& connector : scene.connectors) lock(constraints, mesh, connector);
-}
-
-bool is_plain(const Support& support)
-{
-  return !support.frame.cylinder && support.frame.axis_1 == Vec3{1, 0, 0} && support.frame.axis_2 == Vec3{0, 1, 0} &&
-         support.displacement == Vec3{} && support.rotation == Vec3{};
 }
 
 } // namespace squeal

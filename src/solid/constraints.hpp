@@ -45,18 +45,17 @@ void add_expanded(const Constraints& constraints, PetscInt nodal_dof, double fac
 
 void make_dependent(Constraints& constraints, PetscInt nodal_dof, std::vector<ConstraintTerm> terms);
 
-/// Rows of the relative motion of `to` against `from`, both taken to one place as rigid bodies: 6 x 12 on the motions
-/// of both, or 6 x 6 on those of `from` against the ground.
-Eigen::MatrixXd relative_motion(const Vec3& at, const std::vector<Vec3>& ends);
-
-/// The nodes that a connector joins, one or two, and the place at which it reads their motion.
-struct Joined
+/// The motion of `to` against `from` that a connector reads in its frame, both taken to its place as rigid bodies.
+struct RelativeMotion
 {
-  std::vector<int> nodes;
-  Vec3 at{};
+  std::vector<int> nodes; // one against the ground, or two
+  Eigen::MatrixXd rows{}; // 6 x 6 n, of their motions
 };
 
-Joined joined_by(const Connector& connector, const Mesh& mesh);
+RelativeMotion relative_motion(const Connector& connector, const Mesh& mesh);
+
+/// A connector in messages.
+std::string label_of(const Connector& connector);
 
 /// The motions of couplings by those of their nodes:
 ///     theta = I^-1 sum w_i r_i x u_i,   u = sum w_i u_i/sum w_i + theta x (at - c),
@@ -67,8 +66,5 @@ void add_couplings(Constraints& constraints, const Mesh& mesh, const std::vector
 /// for the free motion of its largest factor; one that the others imply is left out. Throws Error for one that
 /// contradicts them.
 void add_rows(Constraints& constraints, const Mesh& mesh, const Scene& scene);
-
-/// Whether a support holds motions along the axes of the scene, without moving them.
-bool is_plain(const Support& support);
 
 } // namespace squeal

@@ -84,19 +84,23 @@ Eigen::MatrixXd six_by_six(const std::vector<double>& values)
   return result;
 }
 
+/// The contribution of matrices with Rayleigh damping, and the viscous equivalent of a loss factor at omega.
+Contribution damped(std::vector<PetscInt> nodal_dofs, ElementMatrices matrices, const RayleighDamping& damping,
+                    double loss_factor, double omega)
+{
+  Eigen::MatrixXd C = damping.alpha * matrices.mass + damping.beta * matrices.stiffness;
+  if (loss_factor > 0) C += loss_factor / omega * matrices.stiffness;
+  return {std::move(nodal_dofs), std::move(matrices.mass), std::move(C), std::move(matrices.stiffness), loss_factor};
+}
+
 /// G' R S R' G, with G the relative motion of both ends taken to one place: a rigid motion of both does no work.
 Contribution connector_contribution(const Mesh& mesh, const Connector& connector, double omega)
 {
-  const Joined joined = joined_by(connector, mesh);
-  std::vector<Vec3> ends;
-  for (const int node : joined.nodes) ends.push_back(mesh.nodes[node]);
-  const std::string user = "connector from " + connector.from + " to " + connector.to;
-  const Eigen::MatrixXd strain =
-      twice(axes_at(connector.frame, joined.at, user)).transpose() * relative_motion(joined.at, ends);
+  const auto [nodes, strain] = relative_motion(connector, mesh);
   const Eigen::MatrixXd K = strain.transpose() * six_by_six(connector.stiffness) * strain;
   Eigen::MatrixXd C = strain.transpose() * six_by_six(connector.damping) * strain;
   if (connector.loss_factor > 0) C += connector.loss_factor / omega * K;
-  return {nodal_dofs_of(joined.nodes, 6), 0 * K, C, K, connector.loss_factor};
+  return {nodal_dofs_of(nodes, 6), 0 * K, C, K, connector.loss_factor};
 }
 
 /// Returns a small matrix in a file, whole. Throws Error unless it is symmetric and of this order.
@@ -163,12 +167,8 @@ Contribution element_contribution(const MeshPiece& piece, const Scene& scene, st
   const std::vector<Vec3> x = positions_of(piece.mesh, element);
   try
   {
-    ElementMatrices matrices = element_matrices(element.shape, x, material_at(part, x), part.thickness);
-    const RayleighDamping damping = part.damping.value_or(scene.damping);
-    Eigen::MatrixXd C = damping.alpha * matrices.mass + damping.beta * matrices.stiffness;
-    if (part.loss_factor > 0) C += part.loss_factor / loss_omega(scene) * matrices.stiffness;
-    return {nodal_dofs_of(element), std::move(matrices.mass), std::move(C), std::move(matrices.stiffness),
-            part.loss_factor};
+    return damped(nodal_dofs_of(element), element_matrices(element.shape, x, material_at(part, x), part.thickness),
+                  part.damping.value_or(scene.damping), part.loss_factor, loss_omega(scene));
   }
   catch (const std::runtime_error& error)
   {
@@ -188,11 +188,9 @@ std::vector<Contribution> beam_contributions(const Mesh& mesh, const Scene& scen
   for (std::size_t i = 1; i < mesh.beams[index].size(); ++i)
   {
     const std::array nodes = {mesh.beams[index][i - 1], mesh.beams[index][i]};
-    ElementMatrices matrices = beam_matrices(mesh.nodes[nodes[0]], mesh.nodes[nodes[1]], beam.axis_2, section);
-    Eigen::MatrixXd C = scene.damping.alpha * matrices.mass + scene.damping.beta * matrices.stiffness;
-    if (beam.loss_factor > 0) C += beam.loss_factor / loss_omega(scene) * matrices.stiffness;
-    result.push_back({nodal_dofs_of(nodes, 6), std::move(matrices.mass), std::move(C), std::move(matrices.stiffness),
-                      beam.loss_factor});
+    result.push_back(damped(nodal_dofs_of(nodes, 6),
+                            beam_matrices(mesh.nodes[nodes[0]], mesh.nodes[nodes[1]], beam.axis_2, section),
+                            scene.damping, beam.loss_factor, loss_omega(scene)));
   }
   return result;
 }

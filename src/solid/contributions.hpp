@@ -1,5 +1,5 @@
 #pragma once
-/// What the matrices of a structure are the sum of.
+/// Contributions, of which the matrices of a structure are the sum.
 #include "squeal/solid/dofs.hpp"
 
 #include <Eigen/Core>
@@ -22,10 +22,11 @@ double loss_omega(const Scene& scene);
 /// positive.
 Contribution element_contribution(const MeshPiece& piece, const Scene& scene, std::size_t index);
 
-/// Of points, bodies, couplings, added masses, springs, connectors, superelements and beams. The mesh must be whole.
+/// Contributions of points, bodies, couplings, added masses, springs, connectors, superelements and beams. The mesh
+/// must be whole.
 std::vector<Contribution> lumped_contributions(const Mesh& mesh, const Scene& scene);
 
-/// Of the elements of a beam, from end to end.
+/// Contributions of the elements of a beam, from end to end.
 std::vector<Contribution> beam_contributions(const Mesh& mesh, const Scene& scene, std::size_t index);
 
 } // namespace squeal

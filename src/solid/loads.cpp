@@ -173,16 +173,13 @@ Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const DofMap& dof
 
 void assemble_preload(Structure& structure, const MeshPiece& piece, const Scene& scene, MPI_Comm comm)
 {
-  const auto moves = [](const Support& support)
-  { return support.displacement != Vec3{} || support.rotation != Vec3{}; };
-  const bool falls = scene.gravity != Vec3{};
   structure.preload = {};
   structure.bolts.clear();
-  if (!falls && scene.bolts.empty() && std::ranges::none_of(scene.supports, moves)) return;
+  if (!has_preload(scene)) return;
   structure.preload = zeros_like(structure.load);
   std::vector<Contribution> lumped; // on rank 0
   on_rank_zero(comm, [&] { lumped = lumped_contributions(piece.mesh, scene); });
-  if (falls) add_gravity(structure.preload, piece, scene, lumped);
+  if (scene.gravity != Vec3{}) add_gravity(structure.preload, piece, scene, lumped);
   on_rank_zero(comm, [&] { add_prescribed(structure.preload, piece, scene, lumped); });
   end_assembly(structure.preload);
   check(VecAXPY(structure.load, 1, structure.preload));

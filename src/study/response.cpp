@@ -147,7 +147,7 @@ HarmonicSolution solve_at(double omega, const HarmonicBasis& basis, Index size)
   return solution;
 }
 
-/// What the basis gives at a list of frequencies, one a column.
+/// Responses on the basis at a list of frequencies, one a column.
 struct HarmonicScan
 {
   MatrixXcd receptance; // H: rows of what is read within what is driven
@@ -155,7 +155,7 @@ struct HarmonicScan
   MatrixXd defects;     // the same over what is allowed
   Index driven = 0;     // number of forces, the first rows of both
 
-  /// Of each frequency, the geometric mean of the largest value of either side.
+  /// The geometric mean, at each frequency, of the largest value of either side.
   Eigen::RowVectorXd means_of(const MatrixXd& rows) const
   {
     const Eigen::RowVectorXd largest = rows.topRows(driven).colwise().maxCoeff();

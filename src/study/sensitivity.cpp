@@ -16,12 +16,6 @@ using Complex = std::complex<double>;
 
 constexpr double relative_step = 1e-4; // of central differences: most numbers enter M, C and K linearly
 
-/// The contact of the scene that a pair belongs to.
-std::size_t contact_of(const Interface& interface, std::size_t pair)
-{
-  return interface.geometry.empty() ? 0 : static_cast<std::size_t>(interface.geometry[pair].contact);
-}
-
 /// phi^H C_f phi of one pair: by the law, and by the direction of friction.
 struct PairDamping
 {
@@ -79,7 +73,7 @@ void find_powers(const SlidingEquilibrium& sliding, const HeldVectors& vectors, 
     for (std::size_t i = 0; i < motion.size(); ++i)
     {
       const double power = 2 * std::real(std::conj(lambda * motion[i]) * vectors.reactions[j][i]) / energy;
-      const std::size_t contact = contact_of(interface, i);
+      const std::size_t contact = interface.friction.contact_of(i);
       causes.pair_powers.push_back(power);
       put_in(causes.contact_powers, contact, power);
       const double scale = -2 * std::norm(lambda) / energy;
@@ -103,7 +97,7 @@ std::vector<double> strain_of_contacts(const SensitivityProblem& problem, const 
   for (std::size_t i = 0; i < normal.size(); ++i)
     if (const double compliance = compliance_of(interface, i); compliance > 0 && equilibrium.closed[i])
     {
-      const std::size_t contact = contact_of(interface, i);
+      const std::size_t contact = interface.friction.contact_of(i);
       strain.resize(std::max(strain.size(), contact + 1));
       strain[contact] += std::norm(normal[i]) / compliance / held.stiffness[mode];
     }

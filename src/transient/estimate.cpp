@@ -214,7 +214,7 @@ double first_slip(const StuckPair& pair)
   return least;
 }
 
-// Those that stick at the end of the load path. Collective.
+// The pairs that stick at the end of the load path. Collective.
 std::vector<StuckPair> stuck_pairs(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
                                    const ComplexMode& mode)
 {

@@ -66,8 +66,7 @@ std::vector<double> joint_work(const StepBatch& batch, const State& state, Vec v
   for (std::size_t i = 0; i < interface.gap.size(); ++i)
   {
     if (!is_undriven(interface, i)) continue;
-    const std::size_t contact =
-        interface.geometry.empty() ? 0 : static_cast<std::size_t>(interface.geometry[i].contact);
+    const std::size_t contact = interface.friction.contact_of(i);
     work.resize(std::max(work.size(), contact + 1));
     work[contact] += batch.step.h * dot(PairView(state.reactions, interface.directions).of(i),
                                         PairView(velocity, interface.directions).of(i));
@@ -90,7 +89,7 @@ void move_slip(const StepBatch& batch, const std::vector<ContactStatus>& statuse
 double preload_work(const StepBatch& batch, const Structure& structure, Vec v_theta)
 {
   double power = 0;
-  if (structure.preload.get()) check(VecDot(structure.preload, v_theta, &power));
+  if (structure.preload.get() && batch.factors.load != 1) check(VecDot(structure.preload, v_theta, &power));
   return batch.step.h * (1 - batch.factors.load) * power;
 }
 

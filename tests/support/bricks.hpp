@@ -1,5 +1,6 @@
 #pragma once
 /// Meshes of boxes and strips for tests, and fields on their degrees of freedom.
+#include "squeal/base/error.hpp"
 #include "squeal/solid/dofs.hpp"
 #include "squeal/solid/structure.hpp"
 
@@ -147,6 +148,20 @@ inline Built build(const Mesh& mesh, const Scene& scene, MPI_Comm comm)
   built.dofs = number_dofs(mesh, scene, partition, comm);
   built.structure = assemble({mesh, partition, built.dofs}, scene, comm);
   return built;
+}
+
+/// The message that a scene on all ranks is refused with; empty: it is none.
+inline std::string message(const Mesh& mesh, const Scene& scene)
+{
+  try
+  {
+    build(mesh, scene, PETSC_COMM_WORLD);
+  }
+  catch (const Error& error)
+  {
+    return error.what();
+  }
+  return "";
 }
 
 /// A displacement and rotation (x y z rx ry rz) at every place.

@@ -57,19 +57,6 @@ double relative_force(Mat K, Vec u)
   return largest / (size * norm_of(K));
 }
 
-std::string message(const Mesh& mesh, const Scene& scene)
-{
-  try
-  {
-    build(mesh, scene, world);
-  }
-  catch (const Error& error)
-  {
-    return error.what();
-  }
-  return "";
-}
-
 } // namespace
 
 TEST_CASE("a free body feels no force in a rigid motion, and has its mass and inertia")

@@ -1,5 +1,5 @@
 // ranks: 1 2 3
-// What joins bodies, loads them and holds them: couplings, connectors, beams, bolts, gravity, moved and turned
+// Joints, loads and supports: couplings, connectors, beams, bolts, gravity, moved and turned
 // supports. Each against its closed form; tolerances are round-off of sums of some hundred terms.
 #include "../support/approx.hpp"
 #include "../support/bricks.hpp"
@@ -49,19 +49,6 @@ Built built_of(const Scene& scene)
   Mesh mesh;
   add_points(mesh, scene);
   return build(mesh, scene, world);
-}
-
-std::string message(const Mesh& mesh, const Scene& scene)
-{
-  try
-  {
-    build(mesh, scene, world);
-  }
-  catch (const Error& error)
-  {
-    return error.what();
-  }
-  return "";
 }
 
 /// x y z rx ry rz of a node, on rank 0, from all free degrees of freedom.

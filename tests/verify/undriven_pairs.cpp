@@ -75,6 +75,17 @@ Turns turns_of(const SmallModel& model, const std::vector<double>& start, const 
   return turns;
 }
 
+/// The largest error of the turns of a block on a spring with a friction element that decays from 0.4, by the exact
+/// solution.
+double decay_error(const Turns& turns)
+{
+  const std::vector<double> exact = {-.293422, .209590, -.156682, .133569, -.126882, .125384};
+  REQUIRE(turns.at.size() >= exact.size());
+  double worst = 0;
+  for (std::size_t i = 0; i < exact.size(); ++i) worst = std::max(worst, std::abs(turns.at[i] - exact[i]));
+  return worst;
+}
+
 /// A pad between the disc it rubs on and the abutment that holds it: motions pad x, y, disc y, bracket x.
 SmallModel pad_in_abutment(double force)
 {
@@ -102,16 +113,12 @@ TEST_CASE("a block on a rough plane swings a tenth less each half period, and re
 
 TEST_CASE("a spring with a friction element decays to the exact solution as steps get shorter")
 {
-  const std::vector<double> exact = {-.293422, .209590, -.156682, .133569, -.126882, .125384};
   const double T = 2 * M_PI / std::sqrt(1000.);
   const auto error_with = [&](int steps_a_period)
   {
     const Turns turns =
         turns_of(rubbing_block(600, 400), {0.4, 0.4 - 50. / 400, 0}, {}, T / steps_a_period, 4 * steps_a_period);
-    REQUIRE(turns.at.size() >= exact.size());
-    double worst = 0;
-    for (std::size_t i = 0; i < exact.size(); ++i) worst = std::max(worst, std::abs(turns.at[i] - exact[i]));
-    return worst;
+    return decay_error(turns);
   };
   const double coarse = error_with(100), fine = error_with(400);
   CHECK(fine < 5e-4);
@@ -255,16 +262,12 @@ double forced_amplitude(double omega, int steps_a_period)
 
 TEST_CASE("elastic slip in series with friction decays to the exact solution, of second order through stick and slip")
 {
-  const std::vector<double> exact = {-.293422, .209590, -.156682, .133569, -.126882, .125384};
   const double T = 2 * M_PI / std::sqrt(1000.);
   const auto error_with = [&](int steps_a_period)
   {
     const Turns turns =
         turns_of(elastic_block(600, 400, 0), {.4, 0}, {0, .4 - 50. / 400}, T / steps_a_period, 4 * steps_a_period);
-    REQUIRE(turns.at.size() >= exact.size());
-    double worst = 0;
-    for (std::size_t i = 0; i < exact.size(); ++i) worst = std::max(worst, std::abs(turns.at[i] - exact[i]));
-    return worst;
+    return decay_error(turns);
   };
   const double coarse = error_with(100), fine = error_with(200);
   CHECK(fine < 2e-4);

@@ -59,7 +59,7 @@ void end_if_asked(MPI_Comm comm);
 bool checkpoint_is_due();
 
 /// Whether a tenth of the time between checkpoints has passed since the last one: what ends now is then worth one.
-/// By rank 0's clock; collective.
+/// Decided by rank 0's clock; collective.
 bool checkpoint_is_worth_it(MPI_Comm comm);
 /// Notes that a checkpoint was made; the next is due a period later.
 void checkpoint_made();

@@ -7,9 +7,9 @@
 namespace squeal
 {
 
-/// What a pair's natural map is compared with [N]: the largest reaction, of its contact or of all, or where it is
-/// smaller the force that would give the pair the largest free velocity `speed`. A light pair beside heavy ones is then
-/// not passed over.
+/// The force that a pair's natural map is compared with [N]: the largest reaction, of its contact or of all, or where
+/// it is smaller the force that would give the pair the largest free velocity `speed`. A light pair beside heavy ones
+/// is then not passed over.
 inline double force_scale(const NaturalScale& rho, double speed, double largest_reaction)
 {
   const double own = speed * std::min(rho.normal, rho.tangential);

@@ -45,7 +45,7 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
 Interface read_interface(const std::filesystem::path& folder, const Structure& structure, const FrictionLaw& friction,
                          MPI_Comm comm);
 
-/// The same contact, of the same B.
+/// A contact that shares B with this one.
 Interface sharing(const Interface& interface);
 
 /// Throws Error for a pair that cannot move along its normal. Collective.

@@ -36,7 +36,7 @@ struct StickSlipOperator
 StickSlipOperator make_stick_slip_operator(Eigen::MatrixXd N, Eigen::MatrixXd M, int directions,
                                            std::vector<int> contact);
 
-/// The same law with N and q divided by M.
+/// The operator with N and q divided by M.
 struct DividedOperator
 {
   StickSlipOperator of;

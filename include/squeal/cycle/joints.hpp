@@ -19,7 +19,7 @@ struct JointMotion
   OffsetMotion slip{};
 };
 
-/// By undriven pairs: those that stuck in every recorded step. Not collective.
+/// Flags of the undriven pairs that stuck in every recorded step, by pairs. Not collective.
 std::vector<char> held_pairs(const Interface& interface, std::span<const StepRecord> records);
 
 /// The motion in recorded steps from a state; Bu, Bv: B u and B v there. Not collective.

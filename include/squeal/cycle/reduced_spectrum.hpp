@@ -25,7 +25,8 @@ struct LargeValues
 /// Those that a verdict is about.
 inline constexpr LargeValues deciding_values{0.85, 4, 48};
 
-/// Those whose vectors the full model is projected on: each costs a product with its tangent. A search bounds the rest.
+/// Multipliers whose vectors the full model is projected on: each costs a product with its tangent. A search bounds the
+/// rest.
 inline constexpr LargeValues projected_values{0.85, 4, 24};
 
 /// Collective among the map's ranks.

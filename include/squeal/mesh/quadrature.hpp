@@ -6,6 +6,15 @@
 namespace squeal
 {
 
+/// A point of a rule in one dimension, on [-1, 1].
+struct LinePoint
+{
+  double x = 0, weight = 0;
+};
+
+/// Gauss-Legendre rule of n = 2, 3 or 4 points; it is exact to degree 2 n - 1.
+std::vector<LinePoint> gauss(int n);
+
 /// A point of a rule.
 struct QuadraturePoint
 {

@@ -73,7 +73,7 @@ ProjectedSliding project(const SlidingBasis& basis, const LinearisedPoint& point
 /// The pivots of this rank, as local rows.
 std::vector<Eigen::Index> local_pivots(const ClosedContact& contact);
 
-/// What a lift of T changes: the rows of the pivots that this rank has.
+/// The change of T by a lift: the rows of the pivots that this rank has.
 struct Lift
 {
   std::vector<Eigen::Index> pivots{}; // local rows

@@ -31,7 +31,7 @@ template <> inline constexpr std::array words_of<ResultFile> = {
     "report.json", "history.h5",    "sweep.csv",   "sweep_motions.csv", "robustness.csv", "fields.h5",
     "fields.xdmf", "resolved.toml", "options.txt", "reduced",           "checkpoint"};
 
-/// What becomes of the checkpoints of a run that ends.
+/// The fate of the checkpoints of a run that ends.
 enum class Checkpoints
 {
   removed,

@@ -141,8 +141,8 @@ struct Spring
   double damping = 0;      // [N s/m]
 };
 
-/// What joins two bodies, or one to the ground, by the motion of `to` relative to `from`, both as rigid bodies taken to
-/// one place: locked motions are a joint, stiffness on the others a bushing.
+/// A joint of two bodies, or of one with the ground, by the motion of `to` relative to `from`, both as rigid bodies
+/// taken to one place: locked motions are a joint, stiffness on the others a bushing.
 struct Connector
 {
   std::string from;                // point, rigid body or coupling
@@ -197,6 +197,19 @@ struct Support
   Vec3 displacement{}; // [m] that fixed x y z have
   Vec3 rotation{};     // [rad] that fixed rx ry rz have
 };
+
+/// Whether a support moves what it holds.
+inline bool moves(const Support& support)
+{
+  return support.displacement != Vec3{} || support.rotation != Vec3{};
+}
+
+/// Whether a support holds motions along the axes of the scene, without moving them.
+inline bool is_plain(const Support& support)
+{
+  return !moves(support) && !support.frame.cylinder && support.frame.axis_1 == Frame{}.axis_1 &&
+         support.frame.axis_2 == Frame{}.axis_2;
+}
 
 /// A force on a node, a body or a group.
 struct Force

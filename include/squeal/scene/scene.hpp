@@ -317,6 +317,9 @@ std::string scene_reference();
 /// Returns "key" for the keys before all tables, and "table.key" for those of tables that stand once in a scene.
 std::vector<std::string> scene_key_names();
 
+/// Whether part of the load is of bolts, gravity or moved supports, which no load factor scales.
+bool has_preload(const Scene& scene);
+
 /// How a matrix scene names degrees of freedom: by the rows of its matrices, or by the nodes of the code they are from.
 /// "dof:7" is a row of the matrices, "node:1017" all rows of a node; lists and ranges are "node:3,8,20-40".
 struct RowNames

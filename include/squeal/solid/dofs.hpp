@@ -53,7 +53,7 @@ struct DofMap
   std::vector<double>
       shift{}; // [m, rad] of each nodal degree of freedom beside T q: by supports, on rank 0; empty: none
 
-  /// What supports move a nodal degree of freedom by, whatever q is [m, rad].
+  /// The motion of a nodal degree of freedom by supports, whatever q is [m, rad].
   double shift_of(PetscInt nodal_dof) const { return shift.empty() ? 0 : shift[static_cast<std::size_t>(nodal_dof)]; }
 
   /// Row of a nodal degree of freedom. It is empty where the motion is fixed or the node does not have it.
