@@ -1,7 +1,7 @@
 """Decks of Abaqus with parts and assemblies, made flat: every instance gets numbers of its own and its place."""
 
 import numpy as np
-from deck_files import Block, Problem, number, whole
+from squeal.deck_files import Block, Problem, number, whole
 
 NUMBERED = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "BOUNDARY"}  # whose data lines hold numbers of nodes or elements
 NAMING = {"NSET": "NSET", "ELSET": "ELSET", "SURFACE": "NAME"}  # options that name what a block defines

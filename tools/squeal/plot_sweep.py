@@ -5,7 +5,7 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.tri import LinearTriInterpolator, Triangulation
-from plot_basis import frequency_unit, heading, label_row, legend_below, plt, those_with
+from squeal.plot_basis import frequency_unit, heading, label_row, legend_below, plt, those_with
 from squeal import Missing, number_label
 
 COLOURS = ["#c0272d", "#1b6ca8", "#d95f02", "#2e8b57", "#7b3fa0", "#b5893a", "#008b8b", "#d6409f"]

@@ -2,9 +2,9 @@
 
 import re
 
-from abaqus_parts import flattened
-from deck_files import Problem, abaqus_nodes, blocks_of, number, whole
-from mesh_model import FLAT, KINDS, MOTIONS, Model, Part
+from squeal.abaqus_parts import flattened
+from squeal.deck_files import Problem, abaqus_nodes, blocks_of, number, whole
+from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part
 
 SOLIDS = {"4": "tet4", "6": "wedge6", "8": "hex8", "10": "tet10", "20": "hex20"}
 SHELLS = {"3": "tri3", "4": "quad4"}

@@ -5,14 +5,14 @@ import io
 import tempfile
 from pathlib import Path
 
-import common
+from squeal import common
 import numpy as np
 from PIL import Image
-from plot_all import ANIMATION, FIGURES, figures
-from plot_basis import length_unit
-from plot_shape import animate
-from report_style import STYLE
-from report_tables import number, numbers, paragraph, probability, rotation, strongest, table, text, values_of
+from squeal.plot_all import ANIMATION, FIGURES, figures
+from squeal.plot_basis import length_unit
+from squeal.plot_shape import animate
+from squeal.report_style import STYLE
+from squeal.report_tables import number, numbers, paragraph, probability, rotation, strongest, table, text, values_of
 from squeal import Missing
 
 STAGES = ("equilibrium", "modes", "estimate", "response", "transient", "coarse", "cycle", "settled", "attractors", "branch",

@@ -3,34 +3,70 @@ binary format."""
 
 import importlib.util
 import os
+import shutil
 import sys
 from pathlib import Path
 
 TOOL = Path(sys.argv[0]).name
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 BUILT, INSTALLED = ROOT / "build" / "squeal", ROOT.parent.parent / "bin" / "squeal"
-PROGRAM = Path(os.environ.get("SQUEAL", BUILT if (ROOT / "CMakeLists.txt").exists() else INSTALLED)).resolve()
 DEBIAN = "/usr/bin/python3"
 ENVIRONMENT = Path(os.environ.get("SQUEAL_PYTHON", ROOT / "build" / "python"))  # made by tools/setup
+SETTINGS = next(file for file in (ROOT / "tools" / "environment", Path(__file__).with_name("environment")) if file.exists())
 MATRIX_ID, VECTOR_ID = 1211216, 1211214  # PETSc's class numbers, MAT_FILE_CLASSID and VEC_FILE_CLASSID
 BLUE, RED, ORANGE, GREEN, GREY = "#1b6ca8", "#c0272d", "#d95f02", "#2e8b57", "#8a8a8a"
 
 
-def use_environment():
+class SquealError(Exception):
+    """What went wrong, in a sentence."""
+
+
+def _program() -> Path:
+    """SQUEAL=FILE, else that of the sources or of the installation around this package, else the one in PATH."""
+    if "SQUEAL" in os.environ:
+        return Path(os.environ["SQUEAL"]).resolve()
+    if (ROOT / "CMakeLists.txt").exists():
+        return BUILT
+    return INSTALLED if INSTALLED.exists() else Path(shutil.which("squeal") or INSTALLED).resolve()
+
+
+PROGRAM = _program()
+
+
+def program() -> Path:
+    """The program, where it is there; else an error says how it is had."""
+    if not PROGRAM.exists():
+        raise SquealError(f"{PROGRAM} is missing: tools/build makes it, a Debian package or a container brings it (tools/README.md); "
+                          "or say where it is by SQUEAL=FILE")
+    return PROGRAM
+
+
+def owns_process() -> bool:
+    """Whether a tool or job of these sources, or of their installation, was started, and not another program that imports it."""
+    main = getattr(sys.modules["__main__"], "__file__", None)
+    return main is not None and Path(main).resolve().parent in (ROOT / "tools", ROOT / "jobs")
+
+
+def use_environment() -> None:
     """Starts the tool again in the python of the build folder, which has PyVista beside Debian's modules, if it is there."""
     python = ENVIRONMENT / "bin" / "python"
-    if python.exists() and Path(sys.prefix).resolve() != ENVIRONMENT.resolve():
+    if owns_process() and python.exists() and Path(sys.prefix).resolve() != ENVIRONMENT.resolve():
         os.execv(python, [str(python), *sys.argv])
 
 
-def needs(*modules):
-    """Starts the tool again in Debian's python where this one lacks a module; to be called before they are imported."""
+def needs(*modules: str) -> None:
+    """Where this python lacks a module, starts the tool again in Debian's, which has it; an ImportError in a program of others. To
+    be called before the modules are imported."""
     missing = [module for module in modules if importlib.util.find_spec(module) is None]
     if not missing:
         return
+    names = ", ".join(missing)
+    if not owns_process():
+        raise ImportError(f"squeal needs the python module {names}, which {sys.executable} lacks: pip install {' '.join(missing)}, or "
+                          f"take {DEBIAN} with the packages that tools/setup installs", name=missing[0])
     # A private python first in PATH hides the one whose modules Debian installs.
     if os.path.realpath(sys.executable) == os.path.realpath(DEBIAN) or not os.path.exists(DEBIAN):
-        sys.exit(f"{TOOL}: no python module {', '.join(missing)}; tools/setup installs what the tools need")
+        sys.exit(f"{TOOL}: no python module {names}; tools/setup installs what the tools need")
     os.execv(DEBIAN, [DEBIAN, *sys.argv])
 
 
@@ -66,10 +102,6 @@ def arguments_and_options():
     words = sys.argv[1:]
     cut = words.index("--") if "--" in words else len(words)
     return words[:cut], words[cut + 1 :]
-
-
-class SquealError(Exception):
-    """What went wrong, in a sentence."""
 
 
 def tool(main):

@@ -9,7 +9,7 @@ import warnings
 
 import numpy as np
 import scipy.sparse as sparse
-from deck_files import Problem, lines_of, number, whole
+from squeal.deck_files import Problem, lines_of, number, whole
 
 DOF_NAMES = {name: dof for dof, names in enumerate(["-", "X UX DX T1", "Y UY DY T2", "Z UZ DZ T3", "RX ROTX DRX R1",
                                                     "RY ROTY DRY R2", "RZ ROTZ DRZ R3"]) for name in names.split()}

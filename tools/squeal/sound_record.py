@@ -5,7 +5,7 @@ The ends of the record are faded, since its transform would join them. What they
 """
 
 import numpy as np
-from sound_field import AUDIBLE, BANDS, C, REFERENCE, RHO, a_weight
+from squeal.sound_field import AUDIBLE, BANDS, C, REFERENCE, RHO, a_weight
 
 FADE = 0.05  # part of the record at each end
 STUDENT = {8: 2.365, 16: 2.131, 32: 2.040}  # t of 95 % by the number of batches

@@ -3,8 +3,8 @@
 import re
 from collections import Counter
 
-from deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes, sections_of, whole
-from mesh_model import FLAT, KINDS, MOTIONS, Model, Part
+from squeal.deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes, sections_of, whole
+from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part
 
 ELEMENTS = {("CHEXA", 8): "hex8", ("CHEXA", 20): "hex20", ("CPENTA", 6): "wedge6", ("CTETRA", 4): "tet4",
             ("CTETRA", 10): "tet10", ("CQUAD4", 4): "quad4", ("CTRIA3", 3): "tri3"}

@@ -1,15 +1,15 @@
 """Every picture of tools/plot: its name, what draws it, and what it shows."""
 
-import common
-import plot_contact
-import plot_motion
-import plot_response
-import plot_robustness
-import plot_shape
-import plot_spectra
-import plot_stability
-import plot_sweep
-from plot_basis import ABSENT, plt
+from squeal import common
+from squeal import plot_contact
+from squeal import plot_motion
+from squeal import plot_response
+from squeal import plot_robustness
+from squeal import plot_shape
+from squeal import plot_spectra
+from squeal import plot_stability
+from squeal import plot_sweep
+from squeal.plot_basis import ABSENT, plt
 from squeal import Missing
 
 # Name: what draws it, whether it is of one run only, and what it shows.

@@ -2,9 +2,9 @@
 
 import numpy as np
 from matplotlib.collections import PolyCollection
-from plot_basis import STATES, cycle_words, heading, plt, state_colours, state_legend, those_with, unit_of
+from squeal.plot_basis import STATES, cycle_words, heading, plt, state_colours, state_legend, those_with, unit_of
 from squeal import Missing
-from surface import faces, node_cells
+from squeal.surface import faces, node_cells
 
 INSTANTS = 4
 

@@ -5,8 +5,8 @@ import struct
 
 import numpy as np
 import scipy.sparse as sparse
-from deck_files import Problem, fields_of, number, whole
-from vendor_matrices import Labelled, both_triangles, chosen
+from squeal.deck_files import Problem, fields_of, number, whole
+from squeal.vendor_matrices import Labelled, both_triangles, chosen
 
 
 # ---- Nastran: DMIG

@@ -1,6 +1,6 @@
 """The skeleton of a scene for a mesh_model.Model: what the deck says as keys, what it does not say as comments to fill in."""
 
-from mesh_model import KINDS, MOTIONS
+from squeal.mesh_model import KINDS, MOTIONS
 
 
 def text(value):

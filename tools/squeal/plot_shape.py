@@ -4,10 +4,10 @@ import os
 
 import matplotlib
 import numpy as np
-from plot_basis import (RED, SLIP, STICK, cycle_words, heading, length_unit, mode_words, plt, squeal_colours, strongest,
+from squeal.plot_basis import (RED, SLIP, STICK, cycle_words, heading, length_unit, mode_words, plt, squeal_colours, strongest,
                         those_with)
 from squeal import Missing
-from surface import amplitude, faces, widest_phase
+from squeal.surface import amplitude, faces, widest_phase
 
 SWING, WHOLE = 0.12, 0.05  # what moves most is drawn moving by these parts of the size of the moving region and of all
 FRAMES = 24  # at most, of an animation

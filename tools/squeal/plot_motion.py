@@ -2,7 +2,7 @@
 
 import matplotlib
 import numpy as np
-from plot_basis import (RED, SLIP, STICK, colour, cycle_words, heading, is_closed, label_of, length_unit, plt, portrait,
+from squeal.plot_basis import (RED, SLIP, STICK, colour, cycle_words, heading, is_closed, label_of, length_unit, plt, portrait,
                         start_of, state_colours, state_legend, those_with, unit_of)
 from squeal import Missing
 

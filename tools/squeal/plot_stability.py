@@ -1,7 +1,7 @@
 """Pictures of where squeal may start: modes, estimate, and how the shooting and the branch went."""
 
 import numpy as np
-from plot_basis import (RED, SLIP, colour, frequency_unit, heading, label_column, label_of, length_unit, mode_words, plt,
+from squeal.plot_basis import (RED, SLIP, colour, frequency_unit, heading, label_column, label_of, length_unit, mode_words, plt,
                         those_with)
 from squeal import Missing, number_label
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 from matplotlib.lines import Line2D
-from plot_basis import colour, frequency_unit, heading, label_of, legend_below, plt, those_with
+from squeal.plot_basis import colour, frequency_unit, heading, label_of, legend_below, plt, those_with
 
 MOST_COLUMNS, MOST_LINES = 3, 8
 DEPTH = 140  # dB below the largest that are drawn

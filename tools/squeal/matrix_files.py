@@ -3,13 +3,13 @@ tools/vendor_matrices.py and tools/nastran_matrices.py."""
 
 import re
 
-import nastran_matrices as nastran
+from squeal import nastran_matrices as nastran
 import numpy as np
 import scipy.io
 import scipy.sparse as sparse
-import vendor_matrices as vendor
-from common import MATRIX_ID, VECTOR_ID
-from deck_files import Problem, number, whole
+from squeal import vendor_matrices as vendor
+from squeal.common import MATRIX_ID, VECTOR_ID
+from squeal.deck_files import Problem, number, whole
 
 
 def read_petsc(file, name):

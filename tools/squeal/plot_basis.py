@@ -1,11 +1,11 @@
 """What the pictures of tools/plot share: units, colours, labels that keep apart, headings."""
 
-import common
+from squeal import common
 
 common.needs("matplotlib", "numpy")
 import matplotlib
 import numpy as np
-from common import BLUE, ORANGE, RED  # noqa: F401, of the pictures too
+from squeal.common import BLUE, ORANGE, RED  # noqa: F401, of the pictures too
 from squeal import Missing
 
 OPEN, STICK, SLIP = "#c9c9c9", ORANGE, BLUE  # of the contact states 0, 1 and 2

@@ -3,7 +3,7 @@
 import contextlib
 
 import numpy as np
-from plot_basis import colour, cycle_words, frequency_unit, heading, label_of, plt, strongest, those_with
+from squeal.plot_basis import colour, cycle_words, frequency_unit, heading, label_of, plt, strongest, those_with
 from squeal import Missing
 
 REFERENCE = 1e-9  # [m/s], of velocity levels by ISO 1683

@@ -8,7 +8,7 @@ and Nastran those of bricks. An order is here the list of the edges whose mid-si
 from collections import Counter
 
 import numpy as np
-from deck_files import Problem
+from squeal.deck_files import Problem
 
 BOTTOM, TOP = [(0, 1), (1, 2), (2, 3), (3, 0)], [(4, 5), (5, 6), (6, 7), (7, 4)]
 UP = [(0, 4), (1, 5), (2, 6), (3, 7)]

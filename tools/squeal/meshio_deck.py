@@ -4,8 +4,8 @@ import contextlib
 import io
 
 import numpy as np
-from deck_files import Problem
-from mesh_model import FLAT, KINDS, Model, Part
+from squeal.deck_files import Problem
+from squeal.mesh_model import FLAT, KINDS, Model, Part
 
 CELLS = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedron20": "hex20", "wedge": "wedge6",
          "triangle": "tri3", "quad": "quad4", "triangle6": "tri6", "quad8": "quad8"}

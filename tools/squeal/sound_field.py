@@ -8,7 +8,7 @@ with v_n the normal velocity and R the distance to the microphone. It is exact f
 import wave
 
 import numpy as np
-from surface import triangles
+from squeal.surface import triangles
 
 RHO, C = 1.204, 343.2  # [kg/m3], [m/s] of air at 20 degrees Celsius
 REFERENCE = 20e-6  # [Pa] of sound pressure levels

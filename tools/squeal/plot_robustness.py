@@ -1,8 +1,8 @@
 """Picture of random samples: probability of each unstable mode, the damping ratios of all samples, and what drives them."""
 
 import numpy as np
-from plot_basis import heading, plt, those_with
-from plot_sweep import COLOURS
+from squeal.plot_basis import heading, plt, those_with
+from squeal.plot_sweep import COLOURS
 from squeal import Missing, number_label
 
 SHOWN = 8  # modes, those that are unstable most often

@@ -12,6 +12,7 @@ TETRA_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
 # By XDMF's code: number of nodes, faces, edges that have a mid-side node.
 SOLIDS = {9: (8, HEX, ()), 8: (6, WEDGE, ()), 48: (20, HEX, HEX_EDGES), 6: (4, TETRA, ()), 38: (10, TETRA, TETRA_EDGES)}
 SHELLS = {5: 4, 4: 3}  # number of nodes
+VTK = {9: 12, 8: 13, 48: 25, 6: 10, 38: 24, 5: 9, 4: 5}  # its number of each kind; the order of nodes is the same
 POINT = 1  # its number of nodes follows
 
 
