@@ -178,6 +178,14 @@ def test_cards_of_bulk_data(tmp_path, card, table, expected):
         assert scene[table] == expected and left_out == []
 
 
+def test_nodes_and_weights_of_mean_couplings(tmp_path):
+    """RBE3 of two weights: the nodes of each are a group."""
+    scene, left_out = converted(tmp_path, GRIDS + "RBE3,7,,100,123,1.,123,13,14\n,2.,123,15,16\n", "deck.bdf")
+    assert scene["coupling"] == [{"name": "rbe3_7_node", "on": ["rbe3_7", "rbe3_7_2"], "at": [0.5, 0.5, 3], "weights": [1, 2]}]
+    model = TOOL.read_deck(tmp_path / "deck.bdf")
+    assert model.node_sets == {"rbe3_7": [13, 14], "rbe3_7_2": [15, 16]} and len(left_out) == 1
+
+
 def test_names_surfaces_and_contacts_of_optistruct(tmp_path, squeal):
     """Small fields, continuations, names in comments, SURF by corners of faces, CONTACT by PCONT, and the selected load."""
     def row(*fields):
@@ -284,6 +292,65 @@ def test_one_brake_in_three_formats(module_run, tmp_path):
     assert len(found[0]) > 3
     for other in found[1:]:
         np.testing.assert_allclose(other, found[0], rtol=1e-10)
+
+
+UNV = """    -1
+  2411
+         1         1         1        11
+   0.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00
+         2         1         1        11
+   1.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00
+         3         1         1        11
+   0.0000000000000000D+00   1.0000000000000000D+00   0.0000000000000000D+00
+         4         1         1        11
+   0.0000000000000000D+00   0.0000000000000000D+00   1.0000000000000000D+00
+    -1
+    -1
+  2412
+         1        11         2         1         7         2
+         0         1         1
+         1         2
+         2        41         2         1         7         3
+         1         3         2
+         3       111         2         1         7         4
+         1         2         3         4
+    -1
+    -1
+  2467
+         1         0         0         0         0         0         0         1
+foot
+         8         2         0         0
+         2         0         0         0         0         0         0         2
+tips
+         7         3         0         0         7         4         0         0
+         3         0         0         0         0         0         0         1
+wedge
+         8         3         0         0
+    -1
+"""
+
+
+def test_universal_files_keep_groups(tmp_path):
+    """Groups of nodes, faces and solids by Salome's dataset; lines are left out."""
+    (tmp_path / "deck.unv").write_text(UNV)
+    model = TOOL.read_deck(tmp_path / "deck.unv")
+    assert model.elements[3] == ("tet4", (1, 2, 3, 4)) and list(model.parts) == ["wedge"]
+    assert model.surfaces == {"foot": [(1, 3, 2)]} and model.node_sets == {"tips": [3, 4]}
+    assert model.notes == ["1 lines"]
+
+
+@pytest.mark.parametrize("old, new, words", [
+    ("       111         2         1         7         4", "       112         2         1         7         6", ["line 21", "nodes of element 3", "expected 6"]),
+    ("wedge\n         8         3         0         0\n", "wedge\n", ["line 31", "0 entities of wedge"]),
+    ("       111 ", "       113 ", ["line 21", "wedges of 15 nodes"]),
+    ("1.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00\n         3", "x 0 0\n         3", ["line 6", "'x'"]),
+])
+def test_bad_universal_files_are_refused(tmp_path, old, new, words):
+    assert old in UNV
+    (tmp_path / "deck.unv").write_text(UNV.replace(old, new, 1))
+    with pytest.raises(TOOL.Problem) as refused:
+        TOOL.read_deck(tmp_path / "deck.unv")
+    assert all(word in str(refused.value) for word in words), refused.value
 
 
 def slid(scene):
