@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <ranges>
+#include <utility>
 
 namespace squeal
 {
@@ -220,20 +221,25 @@ public:
 
 private:
   /// Tightens the tolerance until the error of these samples' eigenvalues is a part of what their growth rates scatter
-  /// by. What a larger basis changes is the error on the smaller one; errors fall as the product of those of both
-  /// vectors.
+  /// by. What a larger basis changes is the error on the smaller one, which is taken where that is small enough: the
+  /// work of a sample grows with the cube of the shapes. Errors fall as the product of those of both vectors.
   void find_tolerance(std::span<const RobustSample> samples)
   {
     SampledModes coarse = modes_of(samples);
     while (tolerance_ > close_tolerance)
     {
       const Index shapes = model_.shapes();
-      tolerance_ = std::max(close_tolerance, tolerance_ / 10);
+      const double before = std::exchange(tolerance_, std::max(close_tolerance, tolerance_ / 10));
       SampledModes fine = modes_of(samples);
-      const double reduction = std::pow(fine.backward_error / coarse.backward_error, 2);
-      if (model_.shapes() > shapes &&
-          largest_shift(coarse, fine, problem_.modes.band) * reduction <= problem_.accuracy * scatter_of(fine))
-        return;
+      const double shift = largest_shift(coarse, fine, problem_.modes.band),
+                   enough = problem_.accuracy * scatter_of(fine),
+                   reduction = std::pow(fine.backward_error / coarse.backward_error, 2);
+      if (model_.shapes() > shapes && shift <= enough)
+      {
+        tolerance_ = before;
+        return model_.truncate(shapes);
+      }
+      if (model_.shapes() > shapes && shift * reduction <= enough) return;
       coarse = std::move(fine);
     }
   }
