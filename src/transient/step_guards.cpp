@@ -2,6 +2,7 @@
 
 #include "squeal/base/constants.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace squeal
@@ -56,17 +57,6 @@ struct FreeStep
     return std::log(energy);
   }
 };
-
-/// Times the root of each pair's weight on its tangential rows, and zero on normal ones.
-void scale_by_roots(const std::vector<double>& weights, int directions, std::vector<double>& x)
-{
-  const PairView<double> scaled(x, directions);
-  for (std::size_t i = 0; i < scaled.pairs(); ++i)
-  {
-    scaled.normal(i) = 0;
-    for (double& entry : scaled.tangential(i)) entry *= std::sqrt(weights[i]);
-  }
-}
 
 /// A step size, below h, with one solution a step; 0 if there is none, as where a pair's nodes have no mass.
 double step_with_one_solution(const SlidingEquilibrium& sliding, double theta, double h, double fall,
@@ -134,39 +124,21 @@ std::string step_refusal(const Structure& structure, const ComplexMode* mode, do
 
 double fall_of_friction(const ThetaStep& step, const Interface& interface, const std::vector<double>& reactions)
 {
+  constexpr int passes = 30; // of power iteration
   const PairFriction friction = law_of_step(interface.friction, step.theta);
   if (steepest_fall(friction) == 0 || interface.pairs == 0) return 0;
-  std::vector<double> weights;
-  for (std::size_t i = 0; i < interface.gap.size(); ++i)
-    weights.push_back(steepest_fall(friction.of(i)) *
-                      std::max(0., PairView(reactions, interface.directions).normal(i)));
+  std::vector<double> roots(interface.size(), 0.);
+  const PairView<double> weights(roots, interface.directions);
+  for (std::size_t i = 0; i < weights.pairs(); ++i)
+    std::ranges::fill(
+        weights.tangential(i),
+        std::sqrt(steepest_fall(friction.of(i)) * std::max(0., PairView(reactions, interface.directions).normal(i))));
   double largest = 0;
-  const auto iterate = [&]
-  {
-    // power iteration on W_tt between the roots of |mu'| r_n
-    std::vector<double> x(interface.size(), 0.), y = x;
-    const PairView<double> start(x, interface.directions);
-    for (std::size_t i = 0; i < start.pairs(); ++i)
-      for (double& entry : start.tangential(i)) entry = 1 + 0.1 * std::sin(static_cast<double>(i));
-    for (int pass = 0; pass < 30; ++pass)
-    {
-      const double size = std::sqrt(dot(x, x));
-      if (size == 0) break;
-      for (double& entry : x) entry /= size;
-      largest = size;
-      scale_by_roots(weights, interface.directions, x);
-      const std::span<const double> in = x;
-      const std::span<double> out = y;
-      step.W.multiply(std::span(&in, 1), std::span(&out, 1));
-      scale_by_roots(weights, interface.directions, y);
-      std::swap(x, y);
-    }
-  };
   on_every_rank(comm_of(interface.B),
                 [&]
                 {
                   const ServedProducts served(step.W);
-                  if (rank_of(comm_of(interface.B)) == 0) iterate();
+                  if (rank_of(comm_of(interface.B)) == 0) largest = step.W.largest_eigenvalue(roots, passes);
                 });
   MPI_Bcast(&largest, 1, MPI_DOUBLE, 0, comm_of(interface.B));
   return largest;
