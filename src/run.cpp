@@ -136,6 +136,9 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
 {
   Report report;
   report.run = results.run();
+  if (const int ranks = ranks_of(comm); ranks > 1) report.command = "mpirun -n " + std::to_string(ranks) + " ";
+  report.command += options.command;
+  report.place = results.place();
   const StageRunner runner = [&](Stage which, const std::function<bool()>& work)
   { return run_or_leave_out(report, which, comm, work); };
   Model model;
@@ -188,7 +191,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   if (code != ExitCode::interrupted) check_options_used(stages_run(report), comm);
   save();
   results.publish(code == ExitCode::interrupted ? Checkpoints::kept : Checkpoints::removed);
-  print_table(report, scene, comm);
+  print_table(report, scene, options.length, comm);
   print_end(report, results, comm);
   return code;
 }
