@@ -158,9 +158,13 @@ void take_mesh(Model& model, MeshPiece piece, MPI_Comm comm)
     model.dofs.size = piece.dofs.size;
 }
 
-Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
+Model model_of_mesh(Scene& scene, Mesh mesh, MPI_Comm comm)
 {
   Model model;
+  std::vector<int> rotors;
+  on_rank_zero(comm, [&] { rotors = rotors_of_contacts(scene, mesh); });
+  broadcast(rotors, comm);
+  if (!scene.rotors.empty()) drive_contacts(scene, rotors);
   ContactPairs contact;
   MeshPiece piece = numbered(scene, std::move(mesh), contact, comm);
   model.structure = assemble(piece, scene, comm);
@@ -182,7 +186,7 @@ Mesh with_points(Mesh mesh, const Scene& scene)
 
 } // namespace
 
-Model build_model(const Scene& scene, MPI_Comm comm)
+Model build_model(Scene& scene, MPI_Comm comm)
 {
   Model model =
       scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, read_mesh_unless_ended(scene, comm), comm);
@@ -296,7 +300,7 @@ BrakeModel NearbyModels::at(std::span<const SceneNumber> numbers)
 {
   const Scene scene = scene_with(scene_, numbers);
   Values values;
-  for (const auto& [key, value] : numbers) values[key] = value;
+  for (const auto& [key, value] : driven_by(scene_, numbers)) values[key] = value;
   const std::set<Effect> from_own = changes(own_, values), from_last = changes(last_, values);
   last_.values.reset(); // until the next model is made
   if (from_last.contains(Effect::mesh)) piece_.reset();

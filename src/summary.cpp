@@ -27,6 +27,44 @@ void warn_of_uncovered(const Coverage& c, const std::string& slave, const std::s
                                consequence));
 }
 
+/// A sentence for each part that contacts or its own spin turn at two rates.
+void warn_of_rates(const Model& model, const Scene& scene, std::vector<std::string>& sentences)
+{
+  std::map<std::string, double> rates;
+  for (const Part& part : scene.parts)
+    if (part.rotation) rates[part.name] = part.rotation->rate;
+  for (const Contact& contact : scene.contacts)
+  {
+    if (!contact.rotation) continue;
+    const std::string part = part_of(scene, model.mesh, contact.rotor);
+    const auto known = part.empty() ? rates.end() : rates.try_emplace(part, contact.rotation->rate).first;
+    if (known != rates.end() && known->second != contact.rotation->rate)
+      sentences.push_back(format("'%s' turns at %g rad/s, and in the contact of '%s' at %g rad/s: one part has one "
+                                 "rate, which a [[rotor]] says once",
+                                 part.c_str(), known->second, contact.rotor.c_str(), contact.rotation->rate));
+  }
+}
+
+/// A sentence for each contact whose drive is not along its surface.
+void warn_of_drives(const Interface& interface, const Scene& scene, std::vector<std::string>& sentences)
+{
+  constexpr double most = 0.2; // along the normal, of the whole: chords of coarse curved faces have less
+  std::vector<double> normal(scene.contacts.size()), whole(scene.contacts.size());
+  for (const ContactPair& pair : interface.geometry)
+  {
+    const auto contact = static_cast<std::size_t>(pair.contact);
+    const Vec3 velocity = drive_velocity(scene.contacts[contact], pair.position);
+    normal[contact] = std::hypot(normal[contact], dot(velocity, pair.normal));
+    whole[contact] = std::hypot(whole[contact], norm(velocity));
+  }
+  for (std::size_t i = 0; i < normal.size(); ++i)
+    if (normal[i] > most * whole[i])
+      sentences.push_back(
+          format("the drive of '%s' has %.0f %% of its speed along the normal of the contact with '%s', "
+                 "where nothing slides: is its axis or velocity right?",
+                 scene.contacts[i].rotor.c_str(), 100 * normal[i] / whole[i], scene.contacts[i].stator.c_str()));
+}
+
 /// Sentences about elements that are too stiff and slave surfaces that face nothing.
 std::vector<std::string> warnings_of(const Model& model, const Scene& scene)
 {
@@ -47,6 +85,8 @@ std::vector<std::string> warnings_of(const Model& model, const Scene& scene)
     warn_of_uncovered(model.coverage[i], stator_is_slave ? contact.stator : contact.rotor,
                       stator_is_slave ? contact.rotor : contact.stator, "no contact force acts there", sentences);
   }
+  warn_of_rates(model, scene, sentences);
+  warn_of_drives(model.interface, scene, sentences);
   return sentences;
 }
 

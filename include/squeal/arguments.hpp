@@ -1,5 +1,5 @@
 #pragma once
-/// Arguments of the command line that are squeal's own. Nothing here needs PETSc or MPI.
+/// Arguments of the command line that are squeal's own, taken before PETSc starts.
 #include "squeal/base/run_control.hpp"
 #include "squeal/report/report.hpp"
 

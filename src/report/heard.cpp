@@ -217,6 +217,9 @@ std::string linear_text(const Report& report)
   if (report.point.equilibrium.outcome.kind != OutcomeKind::converged)
     return "nothing is known: no equilibrium was found";
   if (!has_run(report.point.modes.outcome)) return "nothing is known: the modes were not computed";
+  const bool touches = std::ranges::count(report.point.equilibrium.closed, 1) > 0;
+  if (report.point.modes.unstable_count == 0 && report.model.pairs > 0 && !touches)
+    return "nothing touches: no contact pair is closed, and friction does nothing";
   if (report.point.modes.unstable_count == 0)
     return report.point.modes.outcome.kind == OutcomeKind::converged
                ? "silent: no mode grows in the band" + beside_rest(report)

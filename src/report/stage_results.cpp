@@ -141,6 +141,11 @@ void add_equilibrium(Entry whole, const Report& report)
   out.list("contacts", add_contact, out.scene().contacts, report.contacts);
   if (out.has(!report.bolts.empty())) out.list("bolts", add_bolt, report.bolts);
   add_probes(out, "probes", "displacement of the probe at equilibrium", report.equilibrium_probes);
+  if (report.model.length > 0 && report.displacement > report.model.length)
+    out.warn(Severity::severe,
+             format("the loads move the structure by %.3g m, which is longer than itself: one pulls a "
+                    "body away from what holds it; turn it round, or add a support",
+                    report.displacement));
   if (found.uniqueness == Uniqueness::not_assured)
     out.warn(Severity::note, "with this much friction other equilibria may exist beside this one");
   if (report.model.pairs > 0 && found.outcome.kind == OutcomeKind::converged && forces.empty())

@@ -84,6 +84,7 @@ struct Report
   ModelSummary model;
   SlidingPoint point;
   std::vector<ContactResultant> contacts; // of the equilibrium, one a contact of the scene; empty on a matrix scene
+  double displacement = 0;                // [m] largest one of the equilibrium
   std::vector<double> equilibrium_probes; // [m] at the equilibrium, one a probe
   std::vector<BoltResult> bolts;          // at the equilibrium
   Response response;
