@@ -71,10 +71,10 @@ def harmonics(time, motion):
 
 
 def motion_of(run, surface, name, shapes, more):
-    """shapes: complex, (harmonic, node, component)."""
-    kept = shapes[:, surface.kept]
-    return {"name": name, "scale": swing_of(run.nodes, amplitude(shapes[0])) / np.abs(shapes).max(), "harmonics": len(shapes),
-            "shape": packed(np.stack([kept.real, kept.imag], axis=-1).astype(np.float32))} | more
+    """shapes: complex, (harmonic, node, component), of the surface's nodes."""
+    swing = swing_of(run.nodes[surface.kept], amplitude(shapes[0]))
+    return {"name": name, "scale": swing / max(np.abs(shapes).max(), 1e-300), "harmonics": len(shapes),
+            "shape": packed(np.stack([shapes.real, shapes.imag], axis=-1).astype(np.float32))} | more
 
 
 def cycle_motion(run, surface):
@@ -83,8 +83,8 @@ def cycle_motion(run, surface):
     except Missing:
         return []
     cycle = run.stage("cycle")
-    shapes, lacking = harmonics(time / cycle["period"], motion)
-    words = f"{len(shapes)} harmonics of its motion are shown, which lack {max(100 * lacking, 0.1):.1g} % of it at most"
+    shapes, lacking = harmonics(time / cycle["period"], motion[:, surface.kept])
+    words = f"{len(shapes)} harmonics of its motion are shown, which lack {max(100 * lacking, 0.01):.2g} % of it"
     return [motion_of(run, surface, f"{cycle_words(run)}, {cycle['frequency_hz']:.5g} Hz", shapes, {"mode": 0, "words": words})]
 
 
@@ -100,7 +100,7 @@ def motions_of(run, surface, room):
             continue
         words = "grows" if mode["unstable"] else "dies out"
         found.append(motion_of(run, surface, f"mode {number}: {mode_words(mode['frequency_hz'], mode['growth_rate'])}",
-                               run.shape(number)[None], {"mode": number, "words": words}))
+                               run.shape(number)[None, surface.kept], {"mode": number, "words": words}))
         room -= len(found[-1]["shape"])
     return found, left_out
 
