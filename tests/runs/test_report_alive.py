@@ -12,14 +12,14 @@ import pytest
 from conftest import INPUTS, ROOT
 
 sys.path.insert(0, str(ROOT / "tools"))
-import plot_basis  # noqa: E402
-import report_charts  # noqa: E402
-import report_input  # noqa: E402
-import report_view  # noqa: E402
+from squeal import plot_basis  # noqa: E402
+from squeal import report_charts  # noqa: E402
+from squeal import report_input  # noqa: E402
+from squeal import report_view  # noqa: E402
 import squeal  # noqa: E402
-import surface  # noqa: E402
-from plot_numbers import axis_label, unit_of_key, words_of  # noqa: E402
-from plot_places import Place, places_of  # noqa: E402
+from squeal import surface  # noqa: E402
+from squeal.plot_numbers import axis_label, unit_of_key, words_of  # noqa: E402
+from squeal.plot_places import Place, places_of  # noqa: E402
 
 
 def unpacked(text, kind):
@@ -187,7 +187,7 @@ def test_a_comparison_begins_with_what_differs(pin, tmp_path):
 
 
 def test_what_a_click_shows_is_a_mode_of_the_run(pin):
-    import plot_stability
+    from squeal import plot_stability
 
     charts, _ = report_charts.charts_of(plot_stability.draw_modes([pin]))
     lines = [line for line in charts[0]["lines"] if "modes" in line]
