@@ -2,6 +2,7 @@
 
 import base64
 import json
+import os
 import re
 import subprocess
 import sys
@@ -157,11 +158,10 @@ def test_units_come_from_the_scene_with_every_default(pin):
 
 
 def page_of(*words, folder, environment=None):
-    import os
-
+    """Without pictures by PyVista, which take long."""
     file = folder / "page.html"
     done = subprocess.run([sys.executable, ROOT / "tools" / "report", *map(str, words), "--output", file], capture_output=True, text=True, timeout=200,
-                          env=os.environ | (environment or {}))
+                          env=os.environ | {"SQUEAL_PYTHON": str(folder)} | (environment or {}))
     assert done.returncode == 0, done.stderr
     return file.read_text()
 
