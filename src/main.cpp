@@ -6,6 +6,7 @@
 #include "squeal/given_options.hpp"
 #include "squeal/report/results_folder.hpp"
 #include "squeal/run.hpp"
+#include "squeal/tools.hpp"
 
 #include <algorithm>
 #include <cinttypes>
@@ -243,6 +244,7 @@ int main(int argc, char** argv)
     std::fprintf(stderr, "squeal: error: the working folder no longer exists: change to another\n");
     return 1;
   }
+  become_tool(argc, argv);
   Arguments arguments = take_arguments(argc, argv);
   std::vector<std::string> options = options_for_petsc(arguments, argc, argv);
   std::vector<char*> words = {argv[0]};

@@ -289,19 +289,19 @@ void add_settled(Entry out, const Report& report)
   const SettledMotion& settled = report.motion.settled;
   const ExaminedMotion& motion = settled.examined;
   const auto& probes = out.scene().probes;
-  const bool of_probe = settled.spectrum_probe >= 0;
+  const bool of_probe = motion.followed >= 0;
   out.brief("kind", "kind of the motion", motion.verdict.kind);
   out.add("between", "text", "of an undecided one: between what", motion.verdict.between);
   out.add("would_decide", "text", "of an undecided one: what would decide", motion.verdict.would_decide);
-  out.show("periods", "-", "windows of a period that were integrated", motion.periods());
+  out.show("periods", "-", "periods that were integrated", motion.periods());
   out.show("discarded", "-", "of these, before the motion was stationary", motion.discarded);
-  out.show("period", "s", "length of a window: the nearest recurrence of the free motion", settled.period);
-  out.add("steps_per_period", "-", "time steps of a window", settled.steps_per_period);
+  out.show("period", "s", "that of the strongest line, or the multiple after which the motion closes", motion.period);
+  out.add("steps_per_period", "-", "time steps of a period, rounded", settled.steps_per_period);
   out.mean("mean_energy", "J", "mean mechanical energy", settled.energy);
   out.mean("mean_fluctuating_energy", "J", "mean energy about equilibrium", settled.fluctuating_energy);
   out.show("step_error", "J", "change of that with half as many steps a period", settled.step_error);
-  out.show("least_energy", "J", "least mean of it over one window", settled.least_energy);
-  out.show("greatest_energy", "J", "greatest mean of it over one window", settled.greatest_energy);
+  out.show("least_energy", "J", "least mean of it over one period", settled.least_energy);
+  out.show("greatest_energy", "J", "greatest mean of it over one period", settled.greatest_energy);
   out.add("shapes", "-", "number of shapes on which the motion is kept", settled.shapes.coordinates.size());
   out.add("energy_beside_shapes", "-", "part of its kinetic energy that they leave out", settled.shapes.left_out);
   out.mean("damping_power", "W", "mean power that damping takes", settled.damping_power);
@@ -311,14 +311,14 @@ void add_settled(Entry out, const Report& report)
   out.mean("stick_fraction", "-", "mean part of the pairs that stick", settled.stick_fraction);
   out.mean("slip_fraction", "-", "mean part of the pairs that slip", settled.slip_fraction);
   const auto add_swing = [swings = out.group("peak_to_peak")](const std::string& name, const MeanValue& swing)
-  { swings.mean(name, "m", "mean swing of the probe within a window", swing); };
+  { swings.mean(name, "m", "mean swing of the probe within a period", swing); };
   for (std::size_t i = 0; i < std::min(probes.size(), settled.peak_to_peak.size()); ++i)
     add_swing(probes[i].name, settled.peak_to_peak[i]);
   if (out.is_example()) add_swing("<probe>", {});
   out.list("exponents", add_exponent, motion.exponents);
   add_base(out.group("base_frequencies_hz"), motion.base);
   out.add("spectrum_of", "text", "the probe that swings most, or `normal force` without probes",
-          of_probe ? probes[static_cast<std::size_t>(settled.spectrum_probe)].name : "normal force");
+          of_probe ? probes[static_cast<std::size_t>(motion.followed)].name : "normal force");
   constexpr std::size_t most = 20;
   std::vector<Line> lines = motion.spectrum.lines;
   lines.resize(std::min(most, lines.size()));
