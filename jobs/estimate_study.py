@@ -10,7 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
-import common
+from squeal import common
 import squeal
 
 common.needs("h5py", "matplotlib", "numpy")

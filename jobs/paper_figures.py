@@ -10,14 +10,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
-import common
+from squeal import common
 import squeal
 
 common.needs("h5py", "matplotlib", "numpy")
 import numpy as np
-from common import BLUE, GREEN, ORANGE, RED
-from plot_motion import energy_of
-from plot_spectra import FLOOR, spectrogram_of
+from squeal.common import BLUE, GREEN, ORANGE, RED
+from squeal.plot_motion import energy_of
+from squeal.plot_spectra import FLOOR, spectrogram_of
 
 plt = common.pyplot(dpi=120, font_size=9)
 SMALL = {"mesh.parameters.size": 4000, "mesh.parameters.pin_radius": 0.0175, "mesh.parameters.pin_height": 0.04,

@@ -15,7 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tools"))
 import squeal
 
-import common
+from squeal import common
 
 common.needs("matplotlib", "numpy")
 LEAST = 0.01  # of a run's time: shorter stages are left out

@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 import squeal
 
-import common
+from squeal import common
 import numpy as np
 
 plt = common.pyplot()

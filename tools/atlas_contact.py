@@ -1,11 +1,11 @@
 """Contact laws and the mass at the contact: marches of small chains, and the pictures of tools/atlas made from them."""
 
-import common
+from squeal import common
 
 common.needs("matplotlib", "numpy")
 import numpy as np
 from atlas_runs import PIN, matrix_scene, plt, run, runs, save
-from common import BLUE, GREEN, ORANGE, RED
+from squeal.common import BLUE, GREEN, ORANGE, RED
 
 LAWS = {"modified": (BLUE, "o", "at u + h/2 v (squeal)"), "velocity": (GREEN, "s", "on velocities"), "end": (RED, "^", "at u+"),
         "start": (ORANGE, "v", "at u")}

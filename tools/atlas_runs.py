@@ -3,7 +3,7 @@
 import hashlib
 from concurrent.futures import ThreadPoolExecutor
 
-import common
+from squeal import common
 
 common.needs("h5py", "matplotlib", "numpy")
 import h5py

@@ -2,12 +2,12 @@
 
 import re
 
-import common
+from squeal import common
 
 common.needs("matplotlib", "numpy")
 import numpy as np
 from atlas_runs import OSCILLATOR, plt, run, runs, save
-from common import BLUE, GREEN, GREY, ORANGE, RED
+from squeal.common import BLUE, GREEN, GREY, ORANGE, RED
 
 
 def basin_map(results):

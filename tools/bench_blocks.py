@@ -1,6 +1,6 @@
 """The elastic block on a moving belt of tools/bench: matrices, sliding start, scene."""
 
-import common
+from squeal import common
 
 common.needs("numpy", "scipy")
 import numpy as np

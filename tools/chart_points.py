@@ -1,13 +1,13 @@
 """What the runs of tools/chart found and what it cost: points, lines of one method, the front of all methods."""
 
-import common
+from squeal import common
 
 common.needs("h5py", "matplotlib", "numpy", "scipy")
 import h5py
 import matplotlib
 import numpy as np
 from chart_runs import CYCLES, tidy
-from common import BLUE, GREEN, GREY, ORANGE, RED
+from squeal.common import BLUE, GREEN, GREY, ORANGE, RED
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 

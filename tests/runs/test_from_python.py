@@ -1,7 +1,9 @@
-"""tools/squeal.py: runs started from Python, and what their results hand over as arrays and tables."""
+"""squeal from Python: runs started from Python, and what their results hand over as arrays and tables."""
 
 import os
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -63,6 +65,32 @@ def test_the_motion_is_that_of_the_probes(pin):
     assert len(pin.iterations()) == len(pin.report["cycle"]["newton"])
 
 
+def test_results_show_their_answers(pin):
+    words = repr(pin)
+    assert words.startswith(f"Results({str(pin.folder)!r}): pin on disc; model {pin.report['model']['dofs']} degrees of freedom; ")
+    assert "modes converged 1 unstable: " in words and f"cycle converged {pin.report['cycle']['frequency_hz']:.1f} Hz" in words
+    page = pin._repr_html_()
+    assert page.count("<tr>") == page.count("</tr>") == words.count(";") and "<td>cycle</td><td>converged</td>" in page
+
+
+def test_the_mesh_is_pyvistas(pin):
+    """Elements of positive volume, so that the order of their nodes is the one that VTK has, and a mode of largest entry 1."""
+    python = Path(os.environ.get("SQUEAL_PYTHON", ROOT / "build" / "python")) / "bin" / "python"
+    if not python.exists():
+        pytest.skip("PyVista is optional: tools/setup installs it into build/python")
+    text = f"""
+import sys
+sys.path.insert(0, {str(ROOT / "tools")!r})
+import squeal
+grid = squeal.Results({str(pin.folder)!r}).mesh(mode=1)
+print(grid.n_cells, grid.compute_cell_sizes()["Volume"].min() > 0, round(float(grid["amplitude"].max()), 5) >= 1)
+"""
+    done = subprocess.run([python, "-B", "-c", text], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    cells, positive, moving = done.stdout.split()
+    assert int(cells) == pin.report["model"]["elements"] and positive == moving == "True"
+
+
 def test_errors_are_sentences(tmp_path):
     with pytest.raises(squeal.SquealError, match="coeficient.*did you mean"):
         squeal.run(INPUTS / "oscillator", {"friction.coeficient": 0.3}, output=tmp_path / "a")
@@ -85,6 +113,12 @@ def test_tables_of_a_study(tmp_path):
     assert results.exit_code == 0
     sweep, thresholds = results.sweep(), results.thresholds()
     assert len(sweep.groupby(["friction.coefficient", "spring.0.damping"])) >= 10
+    data = results.to_xarray()
+    assert set(data.dims) == {"friction.coefficient", "spring.0.damping", "direction", "track"}
+    assert data["growth_rate"].count() == sweep["track"].notna().sum() and data["frequency_hz"].attrs["units"] == "Hz"
+    row = sweep.iloc[-1]
+    picked = data.sel({name: row[name] for name in data.dims})
+    assert float(picked["growth_rate"]) == row["growth_rate"]
     at = thresholds[thresholds["spring.0.damping"] == 0.02].iloc[0]
     assert at["friction.coefficient"] == pytest.approx(0.17649288, abs=2 * at["error"])  # exact
     assert set(results.derivatives()["key"]) == {"friction.coefficient"} and len(results.changes()) == 1

@@ -9,10 +9,10 @@ import pytest
 from conftest import INPUTS, ROOT
 
 sys.path.insert(0, str(ROOT / "tools"))
-import plot_basis  # noqa: E402
-import plot_response  # noqa: E402
-import plot_spectra  # noqa: E402
-import surface  # noqa: E402
+from squeal import plot_basis  # noqa: E402
+from squeal import plot_response  # noqa: E402
+from squeal import plot_spectra  # noqa: E402
+from squeal import surface  # noqa: E402
 from matplotlib.text import Text  # noqa: E402
 
 
@@ -143,7 +143,7 @@ class Ended:
     (Ended("not converged"), "last period of the search, not converged", False)])
 def test_the_period_that_was_kept_is_called_what_it_is(run, title, closed):
     """Where the settled motion is the answer, the picture shows what the search for a cycle left."""
-    import plot_motion
+    from squeal import plot_motion
 
     assert plot_motion.draw_lift_off([run]).axes[0].get_title() == title
     assert plot_basis.is_closed(run) == closed
@@ -304,7 +304,7 @@ def test_the_legend_of_a_spectrum_tells_which_lines_are_beyond_its_axes(monkeypa
 
 
 def test_a_mode_of_a_small_part_is_drawn_from_near():
-    import plot_shape
+    from squeal import plot_shape
 
     class Shaped:
         nodes = np.arange(30.0).reshape(10, 3)
@@ -317,21 +317,21 @@ def test_a_mode_of_a_small_part_is_drawn_from_near():
 
 @pytest.mark.parametrize("scale, low, high", [(0.011, -1e5, 3), (4.4, -5e3, 2e3), (1e-9, -1e4, 0.5), (1e-12, -3, -1)])
 def test_ticks_of_a_logarithm_away_from_zero_keep_apart(scale, low, high):
-    from plot_stability import symlog_ticks
+    from squeal.plot_stability import symlog_ticks
 
     ticks = np.array(symlog_ticks(scale, low, high))
     assert 0 in ticks and len(ticks) <= 13 and np.abs(ticks[ticks != 0]).min() >= 2 * scale
 
 
 def test_the_line_of_a_mode_passes_through_its_thresholds():
-    import plot_sweep
+    from squeal import plot_sweep
 
     x, frequency, growth = plot_sweep.with_thresholds([0.2, 0.3], [1580, 1590], [-50, 60], [{"values": [0.297], "frequency_hz": 1583}])
     assert x.tolist() == [0.2, 0.297, 0.3] and frequency.tolist() == [1580, 1583, 1590] and growth.tolist() == [-50, 0, 60]
 
 
 def test_a_map_grows_from_its_thresholds_and_knows_nothing_of_points_that_failed():
-    import plot_sweep
+    from squeal import plot_sweep
 
     point = lambda x, growth: {"values": [x, 1], "unstable_modes": int(growth > 0), "growth_rate": growth}
     points = [point(0, -5), point(1, 10), point(2, 20), {"values": [3, 1], "unstable_modes": 0}]
@@ -341,7 +341,7 @@ def test_a_map_grows_from_its_thresholds_and_knows_nothing_of_points_that_failed
 
 def test_a_map_of_random_points_shows_the_planes_between_them():
     """Thin triangles and numbers of units far apart included: the growth rate of a plane is met everywhere, and 0 below it."""
-    import plot_sweep
+    from squeal import plot_sweep
 
     values = np.random.default_rng(5).uniform((0.1, 2e9), (0.8, 4e9), (12, 2))
     plane = lambda x, y: 10 * x - 4e-9 * y + 8
@@ -353,7 +353,7 @@ def test_a_map_of_random_points_shows_the_planes_between_them():
 
 def test_a_map_of_two_numbers_shows_the_motions_too():
     """Each motion by its mark in a map of frequencies and one of energies; where none was found a cross says so."""
-    import plot_sweep
+    from squeal import plot_sweep
 
     found = {"outcome": "converged", "stability": "stable", "frequency_hz": 1500.0, "mean_fluctuating_energy": 2e-6}
     motions = [found, found | {"stability": "unstable", "mean_fluctuating_energy": 5e-5}, found | {"outcome": "settled"},
@@ -369,7 +369,7 @@ def test_a_map_of_two_numbers_shows_the_motions_too():
 
 
 def test_random_points_of_one_number_are_drawn():
-    import plot_sweep
+    from squeal import plot_sweep
 
     points = [{"values": [x], "direction": 1, "outcome": "converged", "unstable_modes": int(x > 0), "growth_rate": x, "frequency_hz": 9.0}
               for x in (-1.0, 2.0, 1.0)] + [{"values": [0.0], "direction": -1, "outcome": "no equilibrium", "unstable_modes": 0}]
@@ -381,7 +381,7 @@ def test_random_points_of_one_number_are_drawn():
 
 
 def test_modes_of_a_sweep_look_different():
-    import plot_sweep
+    from squeal import plot_sweep
 
     assert len({plot_sweep.look_of_mode(place) for place in range(64)}) == 64
 

@@ -10,11 +10,11 @@ import pytest
 from conftest import INPUTS, ROOT
 
 sys.path.insert(0, str(ROOT / "tools"))
-import plot_spectra  # noqa: E402
-import sound_field  # noqa: E402
-import sound_record  # noqa: E402
+from squeal import plot_spectra  # noqa: E402
+from squeal import sound_field  # noqa: E402
+from squeal import sound_record  # noqa: E402
 import squeal  # noqa: E402
-from sound_field import C, RHO  # noqa: E402
+from squeal.sound_field import C, RHO  # noqa: E402
 
 RADIUS = 0.1  # [m] of the piston
 
@@ -223,7 +223,7 @@ def test_a_run_sounds_at_the_harmonics_of_its_cycle(tmp_path):
 
 def test_what_is_inside_a_body():
     """Two cubes that share a face: their middles, the face between them and the outer ones."""
-    import surface
+    from squeal import surface
 
     cube = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
     nodes = np.concatenate([cube + (0, 0, z) for z in range(3)])

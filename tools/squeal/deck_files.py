@@ -1,0 +1,313 @@
+"""Decks of other codes as text: keyword blocks of Abaqus and CalculiX, cards of Nastran, each with its place."""
+
+import math
+import re
+import warnings
+
+import numpy as np
+
+
+class Problem(Exception):
+    """What is wrong with the input, in one sentence that names file, line and what was expected."""
+
+
+def lines_of(file):
+    """Numbered lines of a text file; a binary file is refused."""
+    data = file.read_bytes()
+    if b"\0" in data[:4096]:
+        raise Problem(f"{file}: a binary file; expected text")
+    return enumerate(data.decode("latin-1").splitlines(), 1)
+
+
+def included(file, line, name, depth):
+    """A file that a line of a deck includes, beside it."""
+    place = f"{file}, line {line}"
+    if depth > 8:
+        raise Problem(f"{place}: includes go deeper than 8 files")
+    other = file.parent / name.strip().strip("'\"")
+    if not other.is_file():
+        raise Problem(f"{place}: includes {name.strip()}, which is not there")
+    return other
+
+
+# ---- Abaqus and CalculiX
+
+DATA_FILES = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "BOUNDARY"}  # whose INPUT names a file of their data
+
+
+class Block:
+    """One keyword: *NAME, KEY=VALUE, ... and the lines of data below it."""
+
+    def __init__(self, place, name, options):
+        self.place, self.name, self.options = place, name, options
+        self.texts, self.numbers, self.files = [], [], []  # of the lines; files as (first line that is theirs, file)
+
+    def add(self, file, number, text):
+        if not self.files or self.files[-1][1] != file:
+            self.files.append((len(self.texts), file))
+        self.texts.append(text)
+        self.numbers.append(number)
+
+    def place_at(self, index):
+        file = next(file for first, file in reversed(self.files) if first <= index)
+        return f"{file}, line {self.numbers[index]}"
+
+    def place_of(self, number):
+        """Where a line begins with this number."""
+        return next((self.place_at(i) for i, text in enumerate(self.texts) if text.split(",")[0].strip() == str(number)), self.place)
+
+    def with_lines(self, texts):
+        """A copy with other data in the same places."""
+        copy = Block(self.place, self.name, dict(self.options))
+        copy.texts, copy.numbers, copy.files = texts, self.numbers, self.files
+        return copy
+
+    @property
+    def lines(self):
+        return [(self.place_at(i), text) for i, text in enumerate(self.texts)]
+
+    def rows(self, least=0, what=""):
+        """(place, fields) of every line of data; one with fewer than the least number of fields is refused."""
+        for index, line in enumerate(self.texts):
+            place = self.place_at(index)
+            fields = [field.strip() for field in line.split(",")]
+            while fields and fields[-1] == "":
+                fields.pop()
+            if len(fields) < least:
+                raise Problem(f"{place}: '{line[:60]}': {len(fields)} fields; expected {what}")
+            yield place, fields
+
+    def table(self, width, kind):
+        """The data as rows of this many numbers, each of which begins a line; None if some line is of another form."""
+        texts = [text.rstrip(", \t") for text in self.texts]
+        ends = np.cumsum([text.count(",") + 1 for text in texts])
+        if not texts or ends[-1] % width or not np.isin(np.arange(width, ends[-1] + 1, width), ends).all():
+            return None
+        return numbers_in(",".join(texts), ends[-1], kind, width)
+
+
+def numbers_in(text, count, kind, width):
+    """So many numbers between commas as rows; None if there is anything else."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            values = np.fromstring(text, kind, sep=",")
+        except (ValueError, DeprecationWarning):
+            return None
+    return values.reshape(-1, width) if len(values) == count and np.isfinite(values).all() else None
+
+
+def blocks_of(file, depth=0, blocks=None):
+    """The keyword blocks of an input deck, in order; an included file may go on with the data of the last keyword."""
+    blocks, head = [] if blocks is None else blocks, ""
+    for number, line in lines_of(file):
+        line = line.strip()
+        if not line or line.startswith("**"):
+            continue
+        if head or line[0] == "*":
+            head += line
+            if head.endswith(","):
+                continue  # goes on in the next line
+            name, *words = [word.strip() for word in head[1:].split(",")]
+            head = ""
+            options = {}
+            for word in words:
+                key, _, value = word.partition("=")
+                options[" ".join(key.upper().split())] = value.strip().strip('"')
+            if name.upper() == "INCLUDE":
+                blocks_of(included(file, number, options.get("INPUT", ""), depth), depth + 1, blocks)
+                continue
+            blocks.append(Block(f"{file}, line {number}", " ".join(name.upper().split()), options))
+            if blocks[-1].name in DATA_FILES and "INPUT" in options:
+                blocks_of(included(file, number, options["INPUT"], depth), depth + 1, blocks)
+        elif not blocks:
+            raise Problem(f"{file}, line {number}: '{line[:60]}': expected a keyword, such as *NODE")
+        else:
+            blocks[-1].add(file, number, line.replace('"', ""))
+    if head:
+        raise Problem(f"{file}: ends within '{head[:60]}', which goes on behind its last comma")
+    return blocks
+
+
+def whole(text, place, what="a whole number"):
+    try:
+        if "_" in text:  # which Python takes between digits
+            raise ValueError
+        return int(text)
+    except ValueError:
+        raise Problem(f"{place}: '{text}': expected {what}") from None
+
+
+def number(text, place, what="a number"):
+    """Fortran's forms too: 1.5D+3, and Nastran's 1.5+3."""
+    try:
+        value = float(text)
+    except ValueError:
+        fixed = re.sub(r"(?<=[\d.])([+-])", r"E\1", re.sub("[dD]", "E", text.strip()))
+        try:
+            value = float(fixed.replace("EE", "E"))
+        except ValueError:
+            value = math.nan
+    if not math.isfinite(value) or "_" in text:
+        raise Problem(f"{place}: '{text}': expected {what}")
+    return value
+
+
+def node_table(nodes):
+    """Numbers and positions of (place, number, position); a number may come again at the same position only."""
+    found = {}
+    for place, label, position in nodes:
+        if not 0 < label < 2**31:
+            raise Problem(f"{place}: node {label}: expected a number from 1 to {2**31 - 1}")
+        before, known = found.setdefault(label, (place, position))
+        if known is not position and tuple(known) != tuple(position):
+            raise Problem(f"{place}: node {label} is at another position than in {before}: give it one position")
+    return np.array(list(found), np.int64), np.array([at for _, at in found.values()], float).reshape(-1, 3)
+
+
+# ---- Nastran
+
+
+class Card:
+    """One bulk data card: its fields as texts, the name left out; absent ones are ''."""
+
+    def __init__(self, place, name):
+        self.place, self.name, self.fields = place, name, []
+
+    def field(self, index):
+        """Field `index` as Nastran counts them: 2 is the first after the name."""
+        return self.fields[index - 2] if index - 2 < len(self.fields) else ""
+
+    def whole(self, index, default=None):
+        text = self.field(index)
+        if text == "" and default is not None:
+            return default
+        return whole(text, f"{self.place}, {self.name}, field {index}")
+
+    def number(self, index, default=None):
+        text = self.field(index)
+        if text == "" and default is not None:
+            return default
+        return number(text, f"{self.place}, {self.name}, field {index}")
+
+
+def fields_of(line):
+    """The first field of a line of bulk data and the others: free, small or large fields."""
+    if "," in line:
+        fields = [field.strip() for field in line.split(",")]
+        wide = fields[0].endswith("*")
+        data = fields[1:5] if wide else fields[1:9]
+    else:
+        line = line.expandtabs(8)
+        wide = line[:8].rstrip().endswith("*") or line.startswith("*")
+        width, count = (16, 4) if wide else (8, 8)
+        fields = [line[:8].strip()]
+        data = [line[8 + i * width : 8 + (i + 1) * width].strip() for i in range(count)]
+    return fields[0], data + [""] * ((4 if wide else 8) - len(data))
+
+
+def sections_of(file):
+    """Numbered lines without comments, of the case control and of the bulk data."""
+    lines = [(n, line.split("$")[0].rstrip()) for n, line in lines_of(file)]
+    begin = next((i + 1 for i, (_, line) in enumerate(lines) if line.upper().split()[:2] == ["BEGIN", "BULK"]), 0)
+    return lines[: max(begin - 1, 0)], lines[begin:]
+
+
+def cards_of(file, depth=0):
+    """The cards of the bulk data."""
+    cards = []
+    for n, line in sections_of(file)[1]:
+        if not line.strip():
+            continue
+        place = f"{file}, line {n}"
+        if line.upper().startswith("ENDDATA"):
+            break
+        if line.upper().startswith("INCLUDE"):
+            cards += cards_of(included(file, n, line[7:], depth), depth + 1)
+            continue
+        first, data = fields_of(line)
+        if first == "" or first[0] in "+*":
+            if not cards:
+                raise Problem(f"{place}: a continuation; expected a card, such as GRID")
+            cards[-1].fields += data
+        else:
+            cards.append(Card(place, first.rstrip("*").upper()))
+            cards[-1].fields += data
+    return cards
+
+
+def nastran_nodes(cards):
+    """Numbers and positions of all GRID cards, in order."""
+    grids = [card for card in cards if card.name == "GRID"]
+    systems = Systems(cards)
+    default = next((card.field(3) for card in cards if card.name == "GRDSET"), "")
+    nodes = []
+    for card in grids:
+        place = f"{card.place}, GRID {card.field(2)}"
+        system = whole(card.field(3) or default or "0", place)
+        position = systems.position(system, [card.number(i, 0.0) for i in (4, 5, 6)], place)
+        nodes.append((card.place, card.whole(2), position))
+    return node_table(nodes)
+
+
+class Systems:
+    """Coordinate systems by number: CORD2R, CORD2C and CORD2S, each by three points in another system."""
+
+    def __init__(self, cards):
+        self.cards = {card.whole(2): card for card in cards if re.fullmatch(r"CORD[12][RCS]", card.name)}
+        self.known = {0: (np.zeros(3), np.eye(3))}
+
+    def frame(self, number, place, depth=0):
+        """Origin, and the axes in the columns of a matrix, both in the basic system."""
+        if number in self.known:
+            return self.known[number]
+        card = self.cards.get(number)
+        if card is None:
+            raise Problem(f"{place}: coordinate system {number}: expected its card, CORD2R, CORD2C or CORD2S")
+        if card.name.startswith("CORD1"):
+            raise Problem(f"{card.place}: {card.name} {number} is given by nodes: expected CORD2R, CORD2C or CORD2S")
+        if depth > len(self.cards):
+            raise Problem(f"{card.place}: coordinate system {number} is given in itself")
+        base = card.whole(3, 0)
+        self.frame(base, card.place, depth + 1)
+        origin, on_z, in_plane = (self.position(base, [card.number(i + k, 0.0) for k in range(3)], card.place) for i in (4, 7, 10))
+        z, x = on_z - origin, in_plane - origin
+        y = np.cross(z, x)
+        if not np.linalg.norm(y) > 1e-12 * np.linalg.norm(z) * np.linalg.norm(x):
+            raise Problem(f"{card.place}: the three points of coordinate system {number} lie on a line")
+        z, y = z / np.linalg.norm(z), y / np.linalg.norm(y)
+        self.known[number] = origin, np.stack([np.cross(y, z), y, z], axis=1)
+        return self.known[number]
+
+    def position(self, number, at, place):
+        """Basic coordinates of a point that is given in a system."""
+        origin, axes = self.frame(number, place)
+        a, b, c = at
+        kind = self.kind(number)
+        if kind == "C":
+            a, b = a * np.cos(np.radians(b)), a * np.sin(np.radians(b))
+        elif kind == "S":  # radius, angle from z, angle about z
+            polar, around = np.radians(b), np.radians(c)
+            a, b, c = a * np.sin(polar) * np.cos(around), a * np.sin(polar) * np.sin(around), a * np.cos(polar)
+        return origin + axes @ np.array([a, b, c])
+
+    def kind(self, number):
+        return self.cards[number].name[-1] if number in self.cards else "R"
+
+    def keys(self, number, place):
+        """Keys of a scene's axes."""
+        origin, axes = self.frame(number, place)
+        kind = self.kind(number)
+        if kind == "S":
+            raise Problem(f"{place}: motions along the axes of the spherical system {number}: expected a Cartesian or "
+                          "cylindrical one")
+        if kind == "C":
+            return {"cylinder": {"axis": axes[:, 2].tolist(), "centre": origin.tolist()}}
+        return {"axis_1": axes[:, 0].tolist(), "axis_2": axes[:, 1].tolist()}
+
+    def are_basic_axes(self, number, place):
+        """Whether motions along the axes of a system are those along x, y and z."""
+        if number == 0:
+            return True
+        _, axes = self.frame(number, place)
+        return self.cards[number].name[-1] == "R" and np.abs(axes - np.eye(3)).max() < 1e-12

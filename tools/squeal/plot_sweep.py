@@ -1,0 +1,353 @@
+"""Pictures of a sweep: frequency and growth of the followed modes against the number, and a map of stability for two
+numbers; with the motions where they were sought."""
+
+import numpy as np
+from matplotlib.colors import LogNorm
+from matplotlib.lines import Line2D
+from matplotlib.tri import LinearTriInterpolator, Triangulation
+from squeal.plot_basis import frequency_unit, heading, label_row, legend_below, plt, those_with
+from squeal.plot_numbers import axis_label, words_of
+from squeal import Missing
+
+COLOURS = ["#c0272d", "#1b6ca8", "#d95f02", "#2e8b57", "#7b3fa0", "#b5893a", "#008b8b", "#d6409f"]
+MARKS = "os^Dvp*X"
+SHADES = ["black", "#1b6ca8", "#7b3fa0"]  # of marks on the yellow and red of a map
+
+
+def tables_of(results, sweep):
+    """Points in rows; frequencies and growth rates have one column for each followed mode, NaN where it was not found."""
+    points, keys = sweep["points"], (*sweep["keys"], "direction")
+    frequency, growth = np.full((2, len(points), sweep["followed_modes"]), np.nan)
+    rows = {(*p["values"], p["direction"]): row for row, p in enumerate(points)}
+    for line in results.lines("sweep"):
+        if line["track"]:
+            place = rows[tuple(float(line[key]) for key in keys)], int(line["track"])
+            frequency[place], growth[place] = float(line["frequency_hz"]), float(line["growth_rate"])
+    return {"value": np.array([p["values"] for p in points]), "direction": np.array([p["direction"] for p in points]),
+            "frequency": frequency, "growth_rate": growth}
+
+
+def motions_of(sweep, direction):
+    """Values and motions of one direction of rotation, by rising numbers."""
+    points = [p for p in sweep["points"] if "motion" in p and p["direction"] == direction]
+    return sorted(((p["values"], p["motion"]) for p in points), key=lambda pair: pair[0])
+
+
+def look_of(motion):
+    """Mark, filling and label of a motion by what is known of it."""
+    if motion["outcome"] == "settled":
+        return "D", "none", "settled motion, no cycle attracts"
+    if motion["stability"] == "stable":
+        return "o", "black", "cycle, attracts"
+    if motion["stability"] == "unstable":
+        return "v", "none", "cycle, repels"
+    return "s", "0.6", "motion, undecided"
+
+
+def draw_motions(above, energy, motions, size):
+    """Frequencies among the modes' and mean energies, with the error of settled motions."""
+    for (value,), motion in motions:
+        if motion["frequency_hz"] is None:
+            continue
+        mark, filling, label = look_of(motion)
+        style = {"marker": mark, "mfc": filling, "mec": "black", "color": "black", "ls": "", "ms": 6, "zorder": 5}
+        above.plot([value], [motion["frequency_hz"] / size], label=label, **style)
+        energy.errorbar([value], [motion["mean_fluctuating_energy"]], yerr=motion["energy_error"] or 0, capsize=2, lw=0.8,
+                        **style)
+
+
+def over_a_decade(values):
+    return max(values) > 10 * min(values) > 0
+
+
+def sweep_of(results):
+    """What was found at the points of a sweep of modes."""
+    sweep = results.stage("sweep")
+    if not any("growth_rate" in point for point in sweep["points"]):
+        raise Missing("the sweep has no modes")
+    return sweep
+
+
+def labels_of(sweep):
+    """The swept numbers with their names and units."""
+    return [axis_label(*number) for number in zip(sweep["keys"], sweep["names"], sweep["units"])]
+
+
+def strongest_tracks(sweep):
+    """Modes that are unstable somewhere, each with the entry of the direction of rotation in which it grows most."""
+    strongest = {}
+    for entry in sweep["unstable_tracks"]:
+        known = strongest.setdefault(entry["track"], entry)
+        if entry["greatest_growth_rate"] > known["greatest_growth_rate"]:
+            strongest[entry["track"]] = entry
+    return strongest
+
+
+def ordered_rows(table, choice):
+    """Rows of a choice of points, by rising first number."""
+    rows = np.flatnonzero(choice)
+    return rows[np.argsort(table["value"][rows, 0], kind="stable")]
+
+
+def hertz(frequency):
+    return f"{frequency:.0f}" if frequency >= 1000 else f"{frequency:.3g}"
+
+
+def look_of_mode(place):
+    """Colour and mark, different for 64 modes."""
+    return COLOURS[place % len(COLOURS)], MARKS[place // len(COLOURS) % len(MARKS)]
+
+
+def with_thresholds(number, frequency, growth, thresholds):
+    """A mode's values by rising number, with the points where its growth rate is zero: between the points of the sweep the
+    line would cross zero elsewhere."""
+    x = np.concatenate([number, [t["values"][0] for t in thresholds]])
+    order = np.argsort(x, kind="stable")
+    return (x[order], np.concatenate([frequency, [t["frequency_hz"] for t in thresholds]])[order],
+            np.concatenate([growth, np.zeros(len(thresholds))])[order])
+
+
+def thresholds_of(sweep, direction, track=None):
+    return [t for t in sweep["thresholds"] if t["direction"] == direction and track in (None, t["track"])]
+
+
+def draw_column(axes, table, rows, sweep, size, direction):
+    """One direction of rotation: frequencies above, growth rates below; modes that are unstable somewhere in colour."""
+    above, below = axes
+    number = table["value"][rows, 0]
+    coloured = strongest_tracks(sweep)
+    for track in range(table["frequency"].shape[1]):
+        frequency, growth = table["frequency"][rows, track], table["growth_rate"][rows, track]
+        if track not in coloured:
+            above.plot(number, frequency / size, "-", color="0.75", lw=0.8)
+            below.plot(number, growth, "-", color="0.8", lw=0.8)
+    for place, (track, strongest) in enumerate(coloured.items()):
+        frequency, growth = table["frequency"][rows, track], table["growth_rate"][rows, track]
+        if np.isnan(frequency).all():
+            continue
+        colour, mark = look_of_mode(place)
+        label = f"mode {track}, {hertz(strongest['frequency_hz'])} Hz where it grows most"
+        x, along, rising = with_thresholds(number, frequency, growth, thresholds_of(sweep, direction, track))
+        for ax, line, points in ((above, along / size, frequency / size), (below, rising, growth)):
+            ax.plot(x, line, "-", color=colour, lw=1.4)
+            ax.plot(number, points, ls="", color=colour, marker=mark, ms=3.5)
+        above.plot([], [], "-", color=colour, marker=mark, ms=3.5, lw=1.4, label=label)
+    below.axhline(0, color="0.3", lw=0.8)
+
+
+def mark_thresholds(axes, sweep, direction):
+    """Dotted lines, with their values in a row above the lowest axes of modes; those that look equal have one label."""
+    places = {track: place for place, track in enumerate(strongest_tracks(sweep))}
+    values, colours = {}, {}
+    for threshold in thresholds_of(sweep, direction):
+        value, text = threshold["values"][0], f"{threshold['values'][0]:.4g}"
+        shade = look_of_mode(places[threshold["track"]])[0] if threshold["track"] in places else "0.4"
+        for ax in axes:
+            ax.axvline(value, color="0.4", lw=0.8, ls=":")
+        colours[text] = "0.3" if text in values else shade  # of several modes
+        values.setdefault(text, value)
+    if values:
+        axes[0].plot([], [], ls=":", color="0.4", lw=0.8, label="threshold, with its value")
+        label_row(axes[1], list(values.values()), list(values), list(colours.values()))
+
+
+def mark_failed(ax, sweep, direction):
+    """Points that failed, at the lower edge."""
+    failed = [p for p in sweep["points"] if p["outcome"] != "converged" and p["direction"] == direction]
+    for outcome in dict.fromkeys(p["outcome"] for p in failed):
+        x = [p["values"][0] for p in failed if p["outcome"] == outcome]
+        ax.plot(x, [0.03] * len(x), "x", ms=7, mew=1.8, color="black", transform=ax.get_xaxis_transform(), clip_on=False)
+    return {f"point that failed: {p['outcome']}": Line2D([], [], ls="", marker="x", ms=7, mew=1.8, color="black") for p in failed}
+
+
+def limit_growth(axes, growth):
+    """The range of the modes that matter: strongly damped ones would flatten them."""
+    if np.isnan(growth).all():
+        return
+    low, high = np.nanmin(growth), np.nanmax(growth)
+    margin = 0.1 * max(high - low, 1e-12)
+    axes.set_ylim(low - margin, max(high, 0) + margin)
+
+
+def by_stability(points):
+    """Label, style and points of those that are stable and those that are not."""
+    known = [p for p in points if "growth_rate" in p]
+    return (("stable", {"mfc": "white", "mec": "0.5"}, [p for p in known if not p["unstable_modes"]]),
+            ("unstable", {"color": "0.2"}, [p for p in known if p["unstable_modes"]]))
+
+
+def draw_samples(axes, sweep, size, direction):
+    """Random points of one direction of rotation, through which no mode is followed: the least stable mode."""
+    above, below = axes
+    for label, style, points in by_stability(p for p in sweep["points"] if p["direction"] == direction):
+        x = [p["values"][0] for p in points]
+        above.plot(x, [p["frequency_hz"] / size for p in points], "o", ms=4, label=f"least stable mode, {label}", **style)
+        below.plot(x, [p["growth_rate"] for p in points], "o", ms=4, **style)
+    below.axhline(0, color="0.3", lw=0.8)
+
+
+def draw_chart(results, sweep):
+    """The lock-in chart; of random points the least stable mode alone."""
+    found = [p for p in sweep["points"] if "growth_rate" in p]
+    directions = [d for d in (1, -1) if any(p["direction"] == d for p in sweep["points"])]
+    table = tables_of(results, sweep) if sweep["followed_modes"] else None
+    size, unit = frequency_unit(np.nanmax(table["frequency"]) if table else max(p["frequency_hz"] for p in found))
+    motions = {direction: motions_of(sweep, direction) for direction in directions}
+    rows_of_axes = 3 if any(motion["frequency_hz"] for pairs in motions.values() for _, motion in pairs) else 2
+    figure, axes = plt.subplots(rows_of_axes, len(directions), figsize=(4.2 + 3.6 * len(directions), 3.5 * rows_of_axes),
+                                sharex=True, sharey="row", squeeze=False)
+    for column, direction in enumerate(directions):
+        if table:
+            draw_column(axes[:2, column], table, ordered_rows(table, table["direction"] == direction), sweep, size, direction)
+        else:
+            draw_samples(axes[:2, column], sweep, size, direction)
+        if rows_of_axes == 3:
+            draw_motions(axes[0, column], axes[2, column], motions[direction], size)
+        axes[-1, column].set_xlabel(labels_of(sweep)[0])
+        if len(directions) > 1:
+            axes[0, column].set_title("as in the scene" if direction == 1 else "rotation reversed", fontsize=10)
+    axes[0, 0].set_ylabel(f"frequency [{unit}]")
+    axes[1, 0].set_ylabel("growth rate [1/s]")
+    if rows_of_axes == 3:
+        axes[2, 0].set_ylabel("mean energy of the motion [J]")
+        if over_a_decade([m["mean_fluctuating_energy"] for pairs in motions.values() for _, m in pairs if m["frequency_hz"]]):
+            axes[2, 0].set_yscale("log")
+    coloured = list(strongest_tracks(sweep))
+    growth = table["growth_rate"] if table else np.array([p["growth_rate"] for p in found])
+    limit_growth(axes[1, 0], growth[:, coloured] if coloured else growth)
+    legend = {}
+    for column, direction in enumerate(directions):
+        legend |= mark_failed(axes[1, column], sweep, direction)
+        mark_thresholds(axes[:, column], sweep, direction)
+    # A mode keeps its colour: one label each.
+    legend = {label: handle for ax in axes[0] for handle, label in zip(*ax.get_legend_handles_labels())} | legend
+    figure.suptitle(heading([results], "modes against " + words_of(sweep["keys"][0], sweep["names"][0])))
+    legend_below(figure, legend)
+    return figure
+
+
+def level_between(points, thresholds, fine):
+    """Largest growth rate on a fine grid of the first number, at one value of the second: between points in lines, that leave
+    zero at the threshold where a stable point has an unstable neighbour; unknown beside points that failed."""
+    x = [(p["values"][0], max(p["growth_rate"], 0) if "growth_rate" in p else np.nan) for p in points]
+    for left, right in zip(points, points[1:]):
+        stable = [p["unstable_modes"] == 0 for p in (left, right)]
+        crossed = [t["values"][0] for t in thresholds if left["values"][0] < t["values"][0] < right["values"][0]]
+        if crossed and stable[0] != stable[1]:
+            x.append((min(crossed) if stable[0] else max(crossed), 0.0))
+    x.sort()
+    return np.interp(fine, *zip(*x), left=np.nan, right=np.nan)
+
+
+def level_within(values, growth, count=400):
+    """Largest growth rate on a fine grid, in planes between random points; unknown outside of them. On a grid, since the
+    shaded triangles of a picture overlap where they are thin, and show colours that stand for no value."""
+    low, size = values.min(axis=0), np.ptp(values, axis=0)
+    parts = np.linspace(0, 1, count)
+    x, y = low[0] + parts * size[0], low[1] + parts * size[1]
+    unit = (values - low) / np.where(size > 0, size, 1)  # numbers of different units make no long triangles
+    if np.linalg.matrix_rank(unit - unit[0]) < 2:  # no triangle joins them
+        return x, y, np.full((count, count), np.nan)
+    level = LinearTriInterpolator(Triangulation(*unit.T), growth)(*np.meshgrid(parts, parts))
+    return x, y, np.maximum(level.filled(np.nan), 0)
+
+
+def draw_levels(ax, points, thresholds, limit):
+    """Colours of the largest growth rate. Where the second number has a few values, each has a band, since modes are
+    followed along the first number alone; random points are joined by triangles."""
+    values = np.array([p["values"] for p in points])
+    style = {"cmap": "YlOrRd", "vmin": 0, "vmax": limit}
+    seconds = np.unique(values[:, 1])
+    if len(seconds) > len(points) / 2:
+        found = [p for p in points if "growth_rate" in p]
+        x, y, level = level_within(np.array([p["values"] for p in found]), np.array([p["growth_rate"] for p in found]))
+        if np.isfinite(level).any():
+            ax.pcolormesh(x, y, level, shading="nearest", rasterized=True, **style)
+        return
+    fine = np.linspace(values[:, 0].min(), values[:, 0].max(), 600)
+    middles = (seconds[1:] + seconds[:-1]) / 2
+    edges = np.concatenate([seconds[:1], middles, seconds[-1:]]) if len(seconds) > 1 else [seconds[0] - 0.5, seconds[0] + 0.5]
+    level = [level_between(sorted((p for p in points if p["values"][1] == second), key=lambda p: p["values"][0]),
+                           [t for t in thresholds if t["values"][1] == second], fine) for second in seconds]
+    ends = np.concatenate([fine[:1], (fine[1:] + fine[:-1]) / 2, fine[-1:]])
+    ax.pcolormesh(ends, edges, np.array(level), rasterized=True, **style)
+
+
+def lines_of_thresholds(sweep):
+    """Thresholds of each mode, by rising frequency."""
+    groups = {}
+    for threshold in sorted(sweep["thresholds"], key=lambda t: t["frequency_hz"]):
+        groups.setdefault(threshold["track"], []).append(threshold)
+    return groups
+
+
+def draw_heard(figure, rows, sweep, directions):
+    """Maps of what is heard where modes grow: its frequency, below it its mean energy, in colour."""
+    motions = {direction: motions_of(sweep, direction) for direction in directions}
+    heard = [motion for pairs in motions.values() for _, motion in pairs if motion["frequency_hz"]]
+    size, unit = frequency_unit(max(motion["frequency_hz"] for motion in heard))
+    for axes, key, size, label in ((rows[0], "frequency_hz", size, f"frequency of the motion [{unit}]"),
+                                   (rows[1], "mean_fluctuating_energy", 1, "mean energy of the motion [J]")):
+        values = [motion[key] / size for motion in heard]
+        norm = (LogNorm if over_a_decade(values) else plt.Normalize)(min(values), max(values))
+        for ax, direction in zip(axes, directions):
+            ax.grid(False)
+            ax.plot(*zip(*(p["values"] for p in sweep["points"] if p["direction"] == direction)), ".", ms=3, color="0.75", zorder=0)
+            for at, motion in motions[direction]:
+                if motion["frequency_hz"]:
+                    mark, _, words = look_of(motion)
+                    ax.scatter(*at, c=[motion[key] / size], marker=mark, s=60, norm=norm, cmap="viridis", edgecolors="black",
+                               linewidths=0.8, label=words)
+                else:
+                    ax.plot(*at, "x", ms=6, color="0.4", label=f"no motion found: {motion['outcome']}")
+        figure.colorbar(plt.cm.ScalarMappable(norm, "viridis"), ax=axes, label=label)
+
+
+def draw_map(results, sweep):
+    """Largest growth rate over the plane of two numbers; points as dots, thresholds of a mode have one mark. Below it the
+    motions where they were sought."""
+    found = [p for p in sweep["points"] if "growth_rate" in p]
+    directions = [d for d in (1, -1) if any(p["direction"] == d for p in found)]
+    with_motions = any(p["motion"]["frequency_hz"] for p in found if "motion" in p)
+    figure, axes = plt.subplots(3 if with_motions else 1, len(directions), sharex=True, sharey=True, squeeze=False,
+                                figsize=(3.4 + 3.6 * len(directions), 11 if with_motions else 5.2))
+    limit = max(max(p["growth_rate"] for p in found), 1e-12)
+    failures = {}
+    for ax, direction in zip(axes[0], directions):
+        points = [p for p in sweep["points"] if p["direction"] == direction]
+        ax.grid(False)
+        draw_levels(ax, points, thresholds_of(sweep, direction), limit)
+        for label, style, chosen in by_stability(points):
+            ax.plot([p["values"][0] for p in chosen], [p["values"][1] for p in chosen], "o", ms=3, label=label, **style)
+        failed = [p for p in points if p["outcome"] != "converged"]
+        if failed:
+            failures["point that failed"], = ax.plot(*zip(*(p["values"] for p in failed)), "x", ms=6, mew=1.6, color="black")
+        for place, (track, group) in enumerate(lines_of_thresholds(sweep).items()):
+            at = [t["values"] for t in group if t["direction"] == direction]
+            if at:  # of different sizes, since thresholds of two modes may coincide
+                mark, shade = MARKS[1 + place % (len(MARKS) - 1)], SHADES[place // (len(MARKS) - 1) % len(SHADES)]  # a dot is a point
+                mean = np.mean([t["frequency_hz"] for t in group])
+                ax.plot(*zip(*at), ls="", marker=mark, ms=9 - 1.5 * (place % 3), mew=1.2, mec="white", color=shade,
+                        label=f"threshold of mode {track}, {hertz(mean)} Hz")
+        ax.use_sticky_edges = False  # points at the edge are seen whole
+        ax.margins(0.03)
+        if len(directions) > 1:
+            ax.set_title("as in the scene" if direction == 1 else "rotation reversed", fontsize=10)
+    figure.colorbar(plt.cm.ScalarMappable(plt.Normalize(0, limit), "YlOrRd"), ax=axes[0], label="largest growth rate [1/s]")
+    if with_motions:
+        draw_heard(figure, axes[1:], sweep, directions)
+    for ax in axes[-1]:
+        ax.set_xlabel(labels_of(sweep)[0])
+    for ax in axes[:, 0]:
+        ax.set_ylabel(labels_of(sweep)[1])
+    sought = any("motion" in p for p in found)
+    figure.suptitle(heading([results], "stability" + (" and motions" if with_motions else "; no motion was found" if sought else "")))
+    legend_below(figure, {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels())} | failures)
+    return figure
+
+
+def draw_sweep(runs):
+    (results, sweep), *_ = those_with(runs, sweep_of)
+    if len(sweep["keys"]) == 2:
+        return draw_map(results, sweep)
+    return draw_chart(results, sweep)
