@@ -167,7 +167,7 @@ void join_parts(MPI_Comm comm)
 
 bool is_asked_here()
 {
-  return signal_received != 0 || time_is_up();
+  return !control().undisturbed && (signal_received != 0 || time_is_up());
 }
 
 void end_if_asked(MPI_Comm comm)

@@ -1,6 +1,9 @@
 #include "squeal/contact/stick_slip.hpp"
 
+#include "squeal/base/run_control.hpp"
+
 #include <algorithm>
+#include <boost/math/tools/roots.hpp>
 #include <cmath>
 #include <Eigen/Dense>
 #include <limits>
@@ -26,6 +29,28 @@ Vector3d entries(const VectorXd& x, std::size_t pair, int directions)
   return {v[0], v[1], v[2]};
 }
 
+/// Forces taken to the cone of friction, with the derivative by those before.
+struct Projected
+{
+  Vector3d p = Vector3d::Zero();
+  Matrix3d J = Matrix3d::Zero();
+};
+
+/// The root l >= 0 of l (1 - x^2/(1 + l)^2) = e^2: a force of length x is taken into the disc of radius 1 by 1/(1 + l).
+double shrinking(double x, double e)
+{
+  const double least = std::max(0., x - 1);
+  if (e == 0) return least;
+  const double most = least + 1 + 2 * e * e;
+  const auto excess = [&](double l)
+  {
+    const double inside = (1 + l - x) * (1 + l + x) / ((1 + l) * (1 + l));
+    return std::pair{l * inside - e * e, inside + 2 * l * x * x / ((1 + l) * (1 + l) * (1 + l))};
+  };
+  std::uintmax_t evaluations = 200;
+  return boost::math::tools::newton_raphson_iterate(excess, most, least, most, 52, evaluations);
+}
+
 /// A pair before a step of the iteration.
 struct PairState
 {
@@ -34,6 +59,7 @@ struct PairState
   Eigen::Vector2d e; // of the drive; zero: it has none
   NaturalScale rho;
   double grazing; // [N] that no sign is read from
+  double smooth;  // [N] by which corners of the law are rounded off
 
   double pressing() const { return r[0] - rho.normal * w[0]; }
   Eigen::Vector2d pulling() const { return r.tail<2>() - rho.tangential * w.tail<2>(); }
@@ -45,34 +71,35 @@ struct PairState
     return sticks ? ContactStatus::stick : ContactStatus::slip;
   }
 
-  /// The law's defect [N], r - proj(r - rho w) with the disc of the projected normal reaction.
-  Vector3d defect() const
+  /// proj(r - rho w) with the disc of the projected normal reaction.
+  Projected projected() const
   {
-    Vector3d result = r;
-    if (pressing() <= 0) return result;
-    result[0] = rho.normal * w[0];
-    if (status() == ContactStatus::stick)
-      result.tail<2>() = rho.tangential * w.tail<2>();
-    else if (!e.isZero(0))
-      result.tail<2>() -= mu * r[0] * e;
-    else if (const double size = pulling().norm(); size > 0)
-      result.tail<2>() -= mu * pressing() / size * pulling();
-    return result;
+    Projected to;
+    const double h = pressing(), root = std::hypot(h, 2 * smooth);
+    to.p[0] = h > 0 ? (h + root) / 2 : smooth == 0 ? 0 : 2 * smooth * (smooth / (root - h));
+    to.J(0, 0) = smooth > 0 ? to.p[0] / root : status() != ContactStatus::open;
+    if (!e.isZero(0))
+    {
+      to.p.tail<2>() = mu * to.p[0] * e;
+      to.J.block<2, 1>(1, 0) = mu * to.J(0, 0) * e;
+      return to;
+    }
+    const Eigen::Vector2d t = pulling();
+    if (const double radius = mu * to.p[0]; radius > 0)
+    {
+      const Eigen::Vector2d T = t / radius;
+      const double x = T.norm(), l = shrinking(x, smooth / radius), m = 1 + l,
+                   c = smooth > 0 ? smooth / radius / l * (smooth / radius) : std::max(0., 1 - x * x),
+                   along = l > 0 ? 2 * l / (m * m * (c + 2 * l * x * x / (m * m * m))) : 0;
+      to.p.tail<2>() = t / m;
+      to.J.bottomRightCorner<2, 2>() = Eigen::Matrix2d::Identity() / m - along / (m * m) * T * T.transpose();
+      to.J.block<2, 1>(1, 0) = along * mu * to.J(0, 0) * T;
+    }
+    else if (mu > 0 && t.norm() > 0)
+      to.J.block<2, 1>(1, 0) = mu * to.J(0, 0) * t.normalized();
+    return to;
   }
 };
-
-/// The forces that defects of each contact's pairs are compared with [N]: its largest reaction, or a small part of all
-/// contacts' and of what slips would take, where a contact is about to open.
-std::vector<double> scales_of(const StickSlipOperator& of, const StickSlipState& at)
-{
-  constexpr double small = 1e-4;
-  double slip = 0;
-  for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
-    slip = std::max(slip, entries(at.w, pair, of.directions).tail<2>().norm() / of.compliance);
-  return largest_of_contacts(of.contact, of.rho.size(),
-                             [&](std::size_t pair)
-                             { return std::max(entries(at.r, pair, of.directions).norm(), small * slip); });
-}
 
 /// All pairs before a step of the iteration.
 struct PairStates
@@ -80,10 +107,8 @@ struct PairStates
   const StickSlipOperator& of;
   const StickSlipFriction& friction;
   const StickSlipState& at;
-  std::vector<double> scale = scales_of(of, at);
-  double grazing = rounding * *std::ranges::max_element(scale);
-
-  double scale_of(std::size_t pair) const { return scale[static_cast<std::size_t>(of.contact[pair])]; }
+  double smooth;
+  double grazing = rounding * at.r.lpNorm<Eigen::Infinity>();
 
   PairState operator[](std::size_t pair) const
   {
@@ -93,7 +118,19 @@ struct PairStates
             friction.mu[pair],
             {e[0], e.size() > 1 ? e[1] : 0},
             of.rho[pair],
-            grazing};
+            grazing,
+            smooth};
+  }
+
+  /// The laws' defect [N], r - proj(r - rho w).
+  VectorXd defects() const
+  {
+    VectorXd result = at.r;
+    const PairRows<Index> rows(of.directions);
+    for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
+      result.segment(rows.normal(static_cast<Index>(pair)), rows.per_pair()) -=
+          (*this)[pair].projected().p.head(rows.per_pair());
+    return result;
   }
 };
 
@@ -102,21 +139,12 @@ VectorXd times_M(const StickSlipOperator& of, const VectorXd& r)
   return of.M.size() > 0 ? VectorXd(of.M * r) : r;
 }
 
-/// |N w - q - M r| over the part of reactions and motions in it.
+/// |N w - q - M r| over the part of load and reactions in it. Motions are no measure: bodies that nothing holds go far.
 double imbalance(const StickSlipOperator& of, const VectorXd& q, const StickSlipState& at)
 {
   const double per_force = of.M.size() > 0 ? of.compliance : 1,
-               of_motion = of.N.cwiseAbs().lazyProduct(at.w.cwiseAbs()).maxCoeff(),
-               scale = std::max({q.lpNorm<Eigen::Infinity>(), of_motion, per_force * at.r.lpNorm<Eigen::Infinity>()});
+               scale = std::max(q.lpNorm<Eigen::Infinity>(), per_force * at.r.lpNorm<Eigen::Infinity>());
   return scale > 0 ? (of.N * at.w - q - times_M(of, at.r)).lpNorm<Eigen::Infinity>() / scale : 0;
-}
-
-double sum_of_squares(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
-{
-  const PairStates states{of, friction, at};
-  double sum = 0;
-  for (std::size_t pair = 0; pair < of.rho.size(); ++pair) sum += states[pair].defect().squaredNorm();
-  return sum;
 }
 
 } // namespace
@@ -162,149 +190,108 @@ std::optional<DividedOperator> divided(StickSlipOperator& of)
   return DividedOperator{std::move(of), std::move(by)};
 }
 
-double stick_slip_residual(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
+double stick_slip_residual(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at,
+                           double least)
 {
-  const PairStates states{of, friction, at};
+  const VectorXd defects = PairStates{of, friction, at, 0}.defects();
+  const auto size_in = [&](const VectorXd& x)
+  { return [&](std::size_t pair) { return entries(x, pair, of.directions).norm(); }; };
+  const std::vector<double> scale = largest_of_contacts(of.contact, of.rho.size(), size_in(at.r));
   double worst = 0;
   for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
-    if (const double defect = states[pair].defect().norm(); defect > 0)
-      worst = std::max(worst, states.scale_of(pair) > 0 ? defect / states.scale_of(pair)
-                                                        : std::numeric_limits<double>::infinity());
+    if (const double defect = size_in(defects)(pair); defect > 0)
+      worst = std::max(worst, defect / std::max(least, scale[static_cast<std::size_t>(of.contact[pair])]));
   return worst;
 }
 
-namespace
-{
-
-/// The unknowns of a closed pair: r_n first; then the friction of a pair that sticks, or the slip of one that slips.
-/// `force`: an unknown's unit.
-LinearPairLaw closed_law(const PairState& state, double force, int directions)
-{
-  LinearPairLaw law;
-  const double h = state.pressing();
-  law.w[0] = -state.w[0];
-  law.R(0, 0) = force;
-  law.forces = 1;
-  if (state.status() == ContactStatus::stick)
-  {
-    law.w.tail<2>() = -state.w.tail<2>();
-    law.R(1, 1) = law.R(2, 2) = force;
-    law.forces = 1 + directions;
-    return law;
-  }
-  if (!state.e.isZero(0) || state.mu == 0)
-  {
-    law.r.tail<2>() = state.mu * state.r[0] * state.e - state.r.tail<2>();
-    law.R.block<2, 1>(1, 0) = state.mu * force * state.e;
-    law.W(1, 1) = law.W(2, 2) = 1;
-    return law;
-  }
-  // dr_t - mu d dh - a (1 - d d')(dr_t - rho dw_t) = mu h d - r_t,  dh = dr_n + rho_n w_n,  a = mu h/|t|
-  const Eigen::Vector2d t = state.pulling(), d = t / t.norm(), across(-d[1], d[0]);
-  const double a = state.mu * h / t.norm(), size = (1 - a) * (1 - a) + a * a, rest = -across.dot(state.r.tail<2>());
-  law.R.block<2, 1>(1, 0) = state.mu * force * d;
-  law.r.tail<2>() =
-      (state.mu * (h + state.rho.normal * state.w[0]) - d.dot(state.r.tail<2>())) * d + (1 - a) * rest / size * across;
-  law.w.tail<2>() = a * rest / (state.rho.tangential * size) * across;
-  law.W.block<2, 1>(1, 1) = directions == 1 ? Eigen::Vector2d(1, 0) : d; // no turn: the index keeps its sign
-  law.W.block<2, 1>(1, 2) = (1 - a) * across;
-  law.R.block<2, 1>(1, 2) = -a * state.rho.tangential * across;
-  return law;
-}
-
-LinearPairLaw linear_law(const PairState& state, double force, int directions)
-{
-  if (state.status() != ContactStatus::open) return closed_law(state, force, directions);
-  LinearPairLaw law;
-  law.r = -state.r;
-  law.W.setIdentity();
-  return law;
-}
-
-} // namespace
-
 StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
-    : of_(of)
+    : StatusSystem(of, friction, at, {})
+{
+}
+
+StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at,
+                           const Softening& soft)
+    : of_(of), own_(PairRows<Index>(of.directions).per_pair())
 {
   const PairRows<Index> rows(of.directions);
-  const Index own = rows.per_pair();
   const bool whole = of.M.size() > 0;
-  particular_ = {VectorXd::Zero(of.N.rows()), VectorXd::Zero(of.N.rows())};
-  const PairStates states{of, friction, at};
+  const PairStates states{of, friction, at, soft.force};
+  const VectorXd defects = states.defects();
+  particular_ = {-defects, -defects};
   for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
   {
     const PairState state = states[pair];
     statuses_.push_back(state.status());
-    const LinearPairLaw& system = pairs_.emplace_back(linear_law(state, 1 / of.compliance, of.directions));
     const Index first = rows.normal(static_cast<Index>(pair));
-    particular_.r.segment(first, own) = system.r.head(own);
-    particular_.w.segment(first, own) = system.w.head(own);
-    if (!whole && statuses_.back() == ContactStatus::stick) continue;
+    const Vector3d motion(1 / state.rho.normal, 1 / state.rho.tangential, 1 / state.rho.tangential); // of a unit force
+    laws_.push_back({state.projected().J, motion.asDiagonal() * (state.projected().J - Matrix3d::Identity())});
+    particular_.w.segment(first, own_).array() *= motion.head(own_).array();
+    if (!whole && soft.force == 0 && statuses_.back() == ContactStatus::stick) continue;
     unknown_.push_back(pair);
-    for (Index k = 0; k < own; ++k) rows_.push_back(first + k);
+    for (Index k = 0; k < own_; ++k) rows_.push_back(first + k);
   }
-  const auto size = static_cast<Index>(rows_.size());
-  matrix_.resize(size, size);
-  for (std::size_t i = 0; i < unknown_.size(); ++i)
-  {
-    const LinearPairLaw& system = pairs_[unknown_[i]];
-    const Index first = rows.normal(static_cast<Index>(unknown_[i])), to = rows.normal(static_cast<Index>(i));
-    const auto of_pair = Eigen::seqN(first, own);
-    auto columns = matrix_.middleCols(to, own);
-    columns.noalias() = of.N(rows_, of_pair) * system.W.topLeftCorner(own, own);
-    if (whole)
-      columns.noalias() -= of.M(rows_, of_pair) * system.R.topLeftCorner(own, own);
-    else
-      columns.middleRows(to, own) -= system.R.topLeftCorner(own, own);
-    for (Index k = 0; k < own; ++k) // a row in which neither side moves leaves its friction open: it stays
-      if (columns.col(k).isZero(0)) columns(to + k, k) = -1;
-  }
-  if (size > 0) factors_.compute(matrix_);
+  factor(soft);
 }
 
-StickSlipState StatusSystem::spread(const VectorXd& y) const
+void StatusSystem::factor(const Softening& soft)
 {
-  StickSlipState result{VectorXd::Zero(of_.N.rows()), VectorXd::Zero(of_.N.rows())};
   const PairRows<Index> rows(of_.directions);
-  const Index own = rows.per_pair();
+  const auto size = static_cast<Index>(rows_.size());
+  const bool whole = of_.M.size() > 0;
+  MatrixXd matrix(size, size);
   for (std::size_t i = 0; i < unknown_.size(); ++i)
   {
-    const LinearPairLaw& system = pairs_[unknown_[i]];
-    const Index first = rows.normal(static_cast<Index>(unknown_[i]));
-    const auto of_pair = y.segment(rows.normal(static_cast<Index>(i)), own);
-    result.r.segment(first, own) = system.R.topLeftCorner(own, own) * of_pair;
-    result.w.segment(first, own) = system.W.topLeftCorner(own, own) * of_pair;
+    const auto& [R, W] = laws_[unknown_[i]];
+    const Index first = rows.normal(static_cast<Index>(unknown_[i])), to = rows.normal(static_cast<Index>(i));
+    const auto of_pair = Eigen::seqN(first, own_);
+    auto columns = matrix.middleCols(to, own_);
+    const MatrixXd reaction = (R - soft.spring * W).topLeftCorner(own_, own_);
+    columns.noalias() = of_.N(rows_, of_pair) * -W.topLeftCorner(own_, own_);
+    if (whole)
+      columns.noalias() += of_.M(rows_, of_pair) * reaction;
+    else
+      columns.middleRows(to, own_) += reaction;
+    for (Index k = 0; k < own_; ++k) // a row in which neither side moves leaves its friction open: it stays
+      if (columns.col(k).isZero(0)) columns(to + k, k) = 1;
   }
-  return result;
-}
-
-VectorXd StatusSystem::solution(const VectorXd& rhs) const
-{
-  if (rhs.size() == 0) return rhs;
-  if (reciprocal_condition() > 1e-13) return factors_.solve(rhs);
-  // rows of pairs that depend on each other: the shortest solution shares what they carry evenly
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal;
-  orthogonal.setThreshold(1e-12);
-  orthogonal.compute(matrix_);
-  return orthogonal.solve(rhs);
+  if (size == 0) return;
+  factors_.compute(matrix);
+  if (pivot_ratio(factors_) > 1e-13) return;
+  // rows of pairs that depend on each other: a compliance in series with each shares what they carry
+  constexpr double series = 1e-10; // of the largest pivot
+  matrix.diagonal().array() += series * factors_.matrixLU().diagonal().cwiseAbs().maxCoeff();
+  factors_.compute(matrix);
 }
 
 StickSlipState StatusSystem::response(const VectorXd& rhs) const
 {
-  StickSlipState result = spread(solution(rhs(rows_)));
-  if (of_.M.size() > 0) return result;
-  const VectorXd forces = of_.N * result.w - rhs;
+  StickSlipState result{VectorXd::Zero(of_.N.rows()), VectorXd::Zero(of_.N.rows())};
   const PairRows<Index> rows(of_.directions);
-  for (std::size_t pair = 0; pair < pairs_.size(); ++pair)
+  if (!unknown_.empty())
+  {
+    const VectorXd y = factors_.solve(-rhs(rows_));
+    for (std::size_t i = 0; i < unknown_.size(); ++i)
+    {
+      const auto& [R, W] = laws_[unknown_[i]];
+      const Index first = rows.normal(static_cast<Index>(unknown_[i]));
+      const auto of_pair = y.segment(rows.normal(static_cast<Index>(i)), own_);
+      result.r.segment(first, own_) = R.topLeftCorner(own_, own_) * of_pair;
+      result.w.segment(first, own_) = W.topLeftCorner(own_, own_) * of_pair;
+    }
+  }
+  if (unknown_.size() == statuses_.size()) return result;
+  const VectorXd forces = of_.N * result.w - rhs;
+  for (std::size_t pair = 0; pair < statuses_.size(); ++pair)
     if (statuses_[pair] == ContactStatus::stick)
-      result.r.segment(rows.normal(static_cast<Index>(pair)), rows.per_pair()) =
-          forces.segment(rows.normal(static_cast<Index>(pair)), rows.per_pair());
+      result.r.segment(rows.normal(static_cast<Index>(pair)), own_) =
+          forces.segment(rows.normal(static_cast<Index>(pair)), own_);
   return result;
 }
 
-StickSlipState StatusSystem::change(const VectorXd& rhs) const
+StickSlipState StatusSystem::change(const VectorXd& rhs, const Softening& soft) const
 {
-  StickSlipState result = response(rhs - of_.N * particular_.w + times_M(of_, particular_.r));
+  StickSlipState result =
+      response(rhs - of_.N * particular_.w + times_M(of_, particular_.r - soft.spring * particular_.w));
   result.r += particular_.r;
   result.w += particular_.w;
   return result;
@@ -312,12 +299,9 @@ StickSlipState StatusSystem::change(const VectorXd& rhs) const
 
 int StatusSystem::index() const
 {
-  int forces = 0;
   if (unknown_.empty()) return 1;
-  for (const std::size_t pair : unknown_) forces += pairs_[pair].forces;
   const auto negative = (factors_.matrixLU().diagonal().array() < 0).count();
-  const double sign = factors_.permutationP().determinant() * ((forces + negative) % 2 == 0 ? 1 : -1);
-  return sign > 0 ? 1 : -1;
+  return factors_.permutationP().determinant() * (negative % 2 == 0 ? 1 : -1) > 0 ? 1 : -1;
 }
 
 double StatusSystem::reciprocal_condition() const
@@ -328,50 +312,93 @@ double StatusSystem::reciprocal_condition() const
 namespace
 {
 
-/// The part of a change, a power of a half, that leaves the least defect of the laws, or the first that lowers it. A
-/// whole change that raises it may send a body that its statuses leave free any distance away.
-StickSlipState after_change(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at,
-                            const StickSlipState& change)
+StickSlipState beyond(const StickSlipState& at, double part, const StickSlipState& change)
 {
-  constexpr double least = 0x1p-8;
-  const double merit = sum_of_squares(of, friction, at);
-  StickSlipState best;
-  double lowest = std::numeric_limits<double>::infinity();
-  for (double part = 1; part >= least; part /= 2)
+  return {at.r + part * change.r, at.w + part * change.w};
+}
+
+/// One increment that is being solved.
+struct Increment
+{
+  const StickSlipOperator& of;
+  const StickSlipFriction& friction;
+  const VectorXd& q;
+  StickSlipSolution best{}; // so far
+
+  /// What N w = q + M r lacks, with springs from another state on.
+  VectorXd rest(const StickSlipState& at, double spring, const VectorXd& from) const
   {
-    StickSlipState next{at.r + part * change.r, at.w + part * change.w};
-    const double defect = sum_of_squares(of, friction, next);
-    if (!(defect < lowest)) continue;
-    lowest = defect;
-    best = std::move(next);
-    if (lowest < merit * (1 - 1e-4 * part)) break;
+    return q - of.N * at.w + times_M(of, at.r - spring * (at.w - from));
   }
-  return std::isfinite(lowest) ? best : StickSlipState{at.r + change.r, at.w + change.w};
+
+  /// Whether iterations end here: there is a solution, or none to be had.
+  bool ends_at(const StickSlipState& at, double enough)
+  {
+    if (is_asked_here()) throw Interrupted{};
+    const double residual = std::max(stick_slip_residual(of, friction, at, of.least_force(q)), imbalance(of, q, at));
+    if (!(residual >= best.residual)) best = {at, best.iterations, residual, residual <= good};
+    return residual <= enough || !std::isfinite(at.r.sum() + at.w.sum());
+  }
+
+  /// Newton's method on the statuses, which near a solution ends in a few iterations.
+  void by_statuses(StickSlipState at)
+  {
+    constexpr int most = 12;
+    for (int iteration = 0; !ends_at(at, tight) && iteration < most; ++iteration, ++best.iterations)
+      at = beyond(at, 1, StatusSystem(of, friction, at).change(rest(at, 0, at.w), {}));
+  }
+
+  /// The sum of squares that a smoothed step lessens [N^2].
+  double merit(const StickSlipState& at, double smooth, const VectorXd& lacking) const
+  {
+    const double per_force = of.M.size() > 0 ? of.compliance : 1;
+    return PairStates{of, friction, at, smooth}.defects().squaredNorm() + (lacking / per_force).squaredNorm();
+  }
+
+  /// The path of laws with rounded corners to those of Coulomb (src/README.md, section 2.9).
+  void by_smoothing(StickSlipState at);
+};
+
+void Increment::by_smoothing(StickSlipState at)
+{
+  constexpr int most = 200;
+  constexpr double sharper = 0.1, least_part = 0x1p-12, least = 1e-15;
+  const double first = of.motion(q) / of.compliance, pairs = static_cast<double>(of.rho.size());
+  Softening soft{first, 1 / of.compliance};
+  VectorXd from = at.w;
+  for (int iteration = 0; !ends_at(at, good) && iteration < most; ++iteration, ++best.iterations)
+  {
+    const auto lacking = [&] { return rest(at, soft.spring, from); };
+    VectorXd now = lacking();
+    double size = merit(at, soft.force, now);
+    while (size < soft.force * soft.force * pairs && soft.force > least * first)
+    {
+      soft = {sharper * soft.force, sharper * soft.spring};
+      from = at.w;
+      now = lacking();
+      size = merit(at, soft.force, now);
+    }
+    const StickSlipState change = StatusSystem(of, friction, at, soft).change(now, soft);
+    double part = 1;
+    const auto lessens = [&]
+    { return merit(beyond(at, part, change), soft.force, (1 - part) * now) < (1 - 1e-4 * part) * size; };
+    while (part >= least_part && !lessens()) part /= 2;
+    if (part < least_part) return; // rounding
+    at = beyond(at, part, change);
+  }
 }
 
 } // namespace
 
 StickSlipSolution solve_stick_slip(const StickSlipOperator& of, const StickSlipFriction& friction, const VectorXd& q,
-                                   StickSlipState guess)
+                                   const StickSlipState& guess)
 {
-  constexpr int most = 200, patience = 40; // iterations in all, and without a smaller defect of the laws
-  StickSlipSolution best{guess, 0, std::numeric_limits<double>::infinity()};
-  StickSlipState at = std::move(guess);
-  double least = std::numeric_limits<double>::infinity();
-  int last_gain = 0;
-  for (int iteration = 0; iteration <= most && iteration - last_gain <= patience; ++iteration)
-  {
-    const double residual = std::max(stick_slip_residual(of, friction, at), imbalance(of, q, at));
-    if (residual < best.residual) best = {at, iteration, residual};
-    if (!std::isfinite(at.r.sum() + at.w.sum()) || residual <= tight) break;
-    const StatusSystem system(of, friction, at);
-    const StickSlipState change = system.change(q + times_M(of, at.r) - of.N * at.w);
-    // the first change balances the load: a guess that fulfils the laws, as that of no forces does, is no measure
-    at = iteration == 0 ? StickSlipState{at.r + change.r, at.w + change.w} : after_change(of, friction, at, change);
-    if (const double defect = sum_of_squares(of, friction, at); defect < least) least = defect, last_gain = iteration;
-  }
-  best.converged = best.residual <= good;
-  return best;
+  Increment increment{of, friction, q, {guess, 0, std::numeric_limits<double>::infinity(), false}};
+  increment.by_statuses(guess);
+  if (increment.best.converged || of.motion(q) == 0) return increment.best;
+  increment.by_smoothing({VectorXd::Zero(q.size()), guess.w});
+  increment.by_statuses(StickSlipState(increment.best.state));
+  return increment.best;
 }
 
 } // namespace squeal

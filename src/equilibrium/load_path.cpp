@@ -3,6 +3,7 @@
 #include "balance.hpp"
 #include "squeal/algebra/lent_cores.hpp"
 #include "squeal/base/broadcast.hpp"
+#include "squeal/base/run_control.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -78,7 +79,7 @@ StickSlipOperator operator_of(const PathOperators& operators, const Interface& i
 /// The result that rank 0 finds on the rows of the pairs, and every rank has then.
 struct Found
 {
-  int completed = 0, increments = 0, iterations = 0, index = 0;
+  int stopped = 0, completed = 0, increments = 0, iterations = 0, index = 0;
   double change = 0, reciprocal_condition = 0;
   std::string reason{};
   std::vector<double> r, w, offset;
@@ -87,7 +88,7 @@ struct Found
 
 void share(Found& found, MPI_Comm comm)
 {
-  for (int* number : {&found.completed, &found.increments, &found.iterations, &found.index})
+  for (int* number : {&found.stopped, &found.completed, &found.increments, &found.iterations, &found.index})
     MPI_Bcast(number, 1, MPI_INT, 0, comm);
   for (double* number : {&found.change, &found.reciprocal_condition}) MPI_Bcast(number, 1, MPI_DOUBLE, 0, comm);
   broadcast(found.reason, comm);
@@ -142,6 +143,7 @@ struct EndOfPath
   StickSlipOperator of{};
   std::optional<Eigen::PartialPivLU<MatrixXd>> by{}; // M of the operator, where it is divided
   StickSlipFriction friction{};
+  double least_force = 0;
   std::optional<StatusSystem> system{};
   Found found{};
 
@@ -162,6 +164,7 @@ void walk_to_end(const PathOperators& operators, const Interface& interface, std
   const PathProblem problem{end.of, end.by ? 1 : operators.held.kappa, interface.gap, friction_of(interface), ends};
   const PathWalk walk = from ? hold_at(problem, *from) : walk_path(problem);
   end.friction = walk.friction;
+  if (walk.completed) end.least_force = end.of.least_force(walk.q);
   Found& found = end.found;
   found.completed = walk.completed;
   found.increments = walk.increments;
@@ -249,7 +252,8 @@ double residual_of(const Interface& interface, const EndOfPath& end, const Equil
                     as_vector(slip_positions(interface, equilibrium.u, equilibrium.reactions)) +
                         as_vector(end.found.offset)};
   double residual = 0;
-  on_rank_zero(comm_of(interface.B), [&] { residual = stick_slip_residual(end.of, end.friction, at); });
+  on_rank_zero(comm_of(interface.B),
+               [&] { residual = stick_slip_residual(end.of, end.friction, at, end.least_force); });
   MPI_Bcast(&residual, 1, MPI_DOUBLE, 0, comm_of(interface.B));
   return residual;
 }
@@ -272,9 +276,21 @@ Equilibrium find_by_path(const PathOperators& operators, const Structure& struct
   const MPI_Comm comm = comm_of(structure.load);
   const std::vector<PathEnd> ends = ends_of(operators, structure, interface);
   EndOfPath end;
-  on_rank_zero_with_lent_cores(comm, interface.size(), [&] { walk_to_end(operators, interface, ends, from, end); });
+  on_rank_zero_with_lent_cores(comm, interface.size(),
+                               [&]
+                               {
+                                 try
+                                 {
+                                   walk_to_end(operators, interface, ends, from, end);
+                                 }
+                                 catch (const Interrupted&)
+                                 {
+                                   end.found.stopped = 1;
+                                 }
+                               });
   Found& found = end.found;
   share(found, comm);
+  if (found.stopped) join_parts(comm); // which throws
   Equilibrium equilibrium;
   equilibrium.u = zeros_like(structure.load);
   equilibrium.directions = interface.directions;

@@ -69,56 +69,31 @@ VectorXd next_offset(const PathWalk& walk, int directions)
   return offset;
 }
 
-/// Pairs that a guess takes as closed and stuck beside those that press already.
-enum class Closed
-{
-  pressed,
-  touching,
-  all,
-};
-
-StickSlipState guess_from(const PathWalk& walk, const StickSlipOperator& of, const VectorXd& q, Closed closed)
-{
-  StickSlipState guess = walk.state;
-  const PairView<double> r(guess.r, of.directions), w(guess.w, of.directions);
-  const double size = of.motion(q);
-  for (std::size_t pair = 0; pair < w.pairs(); ++pair)
-  {
-    std::ranges::fill(w.tangential(pair), 0.);
-    const bool closes = closed == Closed::all || (closed == Closed::touching && w.normal(pair) <= 1e-12 * size);
-    if (!closes) continue;
-    w.normal(pair) = 0;
-    r.normal(pair) = std::max(r.normal(pair), 1e-3 * size / of.compliance);
-  }
-  return guess;
-}
-
 /// Takes the walk to a place in one increment. Returns whether there is a solution; else the walk is as it was.
 bool advance_to(const PathProblem& problem, const Place& place, PathWalk& walk)
 {
   const StickSlipOperator& of = problem.of;
   const VectorXd offset = next_offset(walk, of.directions), q = load_at(problem, place) + of.N * offset;
   const StickSlipFriction friction = friction_at(problem, place);
-  for (const Closed closed : {Closed::pressed, Closed::touching, Closed::all})
+  StickSlipState guess = walk.state; // without slip
+  const PairView<double> slip(guess.w, of.directions);
+  for (std::size_t pair = 0; pair < slip.pairs(); ++pair) std::ranges::fill(slip.tangential(pair), 0.);
+  StickSlipSolution found = solve_stick_slip(of, friction, q, guess);
+  walk.iterations += found.iterations;
+  if (!found.converged) return false;
+  if (walk.increments > 0)
   {
-    StickSlipSolution found = solve_stick_slip(of, friction, q, guess_from(walk, of, q, closed));
-    walk.iterations += found.iterations;
-    if (!found.converged) continue;
-    if (walk.increments > 0)
-    {
-      const VectorXd moved = (found.state.w - offset) - (walk.state.w - walk.offset);
-      walk.largest_move = std::max(walk.largest_move, moved.lpNorm<Eigen::Infinity>());
-    }
-    walk.state = std::move(found.state);
-    walk.offset = offset;
-    walk.q = q;
-    walk.friction = friction;
-    walk.step = place.step;
-    walk.part = place.part;
-    ++walk.increments;
-    return true;
+    const VectorXd moved = (found.state.w - offset) - (walk.state.w - walk.offset);
+    walk.largest_move = std::max(walk.largest_move, moved.lpNorm<Eigen::Infinity>());
   }
-  return false;
+  walk.state = std::move(found.state);
+  walk.offset = offset;
+  walk.q = q;
+  walk.friction = friction;
+  walk.step = place.step;
+  walk.part = place.part;
+  ++walk.increments;
+  return true;
 }
 
 /// The whole path with each step in so many parts, which are halved where there is no solution.

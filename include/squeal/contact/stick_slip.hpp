@@ -30,6 +30,9 @@ struct StickSlipOperator
   {
     return (M.size() > 0 ? 1 : compliance) * q.lpNorm<Eigen::Infinity>();
   }
+
+  /// A force [N] that counts as one beside this right-hand side, where a contact is about to open.
+  double least_force(const Eigen::VectorXd& q) const { return 1e-6 * motion(q) / compliance; }
 };
 
 /// `contact`: as above.
@@ -59,22 +62,24 @@ struct StickSlipState
   Eigen::VectorXd r, w; // [N, m]
 };
 
-/// dr = r + R y and dw = w + W y fulfil the linearised law of a pair for all y. Force-like unknowns are scaled.
-struct LinearPairLaw
+/// What makes a system of statuses regular on the way to a solution: laws with corners rounded off by a force [N], and
+/// springs across all rows [N/m].
+struct Softening
 {
-  Eigen::Vector3d r{0, 0, 0}, w{0, 0, 0};
-  Eigen::Matrix3d R = Eigen::Matrix3d::Zero(), W = Eigen::Matrix3d::Zero();
-  int forces = 0; // unknowns that are forces, whose columns have the other sign
+  double force = 0, spring = 0;
 };
 
-/// The system of the statuses that an increment ended with, factored.
+/// The system of the statuses that an increment ended with, factored: with forces p = proj(r - rho w) and their
+/// derivative J, dr = J y + p - r and rho dw = (J - 1) y + p - r fulfil the linearised laws for all y.
 class StatusSystem
 {
 public:
   StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at);
+  StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at,
+               const Softening& soft);
 
   /// The change of the state within the statuses by which N w - M r grows by `rhs`, and the laws' residual goes.
-  StickSlipState change(const Eigen::VectorXd& rhs) const;
+  StickSlipState change(const Eigen::VectorXd& rhs, const Softening& soft) const;
 
   /// The change within the statuses by `rhs` alone: the laws' residual stays.
   StickSlipState response(const Eigen::VectorXd& rhs) const;
@@ -84,21 +89,26 @@ public:
   double reciprocal_condition() const; // smallest over largest pivot
 
 private:
-  Eigen::VectorXd solution(const Eigen::VectorXd& rhs) const; // of the system
-  StickSlipState spread(const Eigen::VectorXd& y) const;
+  struct Law
+  {
+    Eigen::Matrix3d r, w; // [-, m/N] by y
+  };
+
+  void factor(const Softening& soft);
 
   const StickSlipOperator& of_;
-  std::vector<LinearPairLaw> pairs_;
+  Eigen::Index own_; // rows of a pair
+  std::vector<Law> laws_;
   std::vector<ContactStatus> statuses_;
   std::vector<std::size_t> unknown_; // pairs of the system
   std::vector<Eigen::Index> rows_;   // theirs
-  Eigen::MatrixXd matrix_;
   Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
   StickSlipState particular_; // y = 0
 };
 
-/// The largest miss of a pair's law, over the largest reaction of its contact.
-double stick_slip_residual(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at);
+/// The largest miss of a pair's law, over the largest reaction of its contact, or `least` [N].
+double stick_slip_residual(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at,
+                           double least);
 
 /// How an increment ended.
 struct StickSlipSolution
@@ -111,6 +121,6 @@ struct StickSlipSolution
 
 /// Solves one increment from a guess.
 StickSlipSolution solve_stick_slip(const StickSlipOperator& of, const StickSlipFriction& friction,
-                                   const Eigen::VectorXd& q, StickSlipState guess);
+                                   const Eigen::VectorXd& q, const StickSlipState& guess);
 
 } // namespace squeal
