@@ -272,7 +272,7 @@ bool settles_on_another_cycle(const MotionSearch& search)
   if (settled.outcome.kind != OutcomeKind::settled || settled.examined.verdict.kind != MotionKind::periodic)
     return false;
   constexpr double fewest = 8; // steps in a period
-  const double period = period_of(settled.examined.base), step = settled.period / settled.steps_per_period;
+  const double period = period_of(settled.examined.base), step = settled.examined.period / settled.steps_per_period;
   if (!std::isfinite(period) || period < fewest * step) return false; // rounding has lines, too
   const LimitCycle& cycle = search.found.cycle;
   const ReachedMotion found{
@@ -292,7 +292,7 @@ void seek_from_settled(MotionSearch& search, const char* name)
   CycleSettings settings = search.scene.cycle;
   if (settings.steps_per_period > 0) // the steps that it was seen at
     settings.steps_per_period =
-        static_cast<int>(std::lround(period / settled.period * static_cast<double>(settled.steps_per_period)));
+        static_cast<int>(std::lround(period / settled.examined.period * settled.steps_per_period));
   FittedCycle fitted = seek_cycle(search, name, settings);
   LimitCycle& cycle = fitted.cycle;
   if (cycle.cut_short) motion.cycle.cut_short = true; // whether it attracts is not known: the settled motion is

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <span>
 
 namespace squeal
@@ -23,21 +22,6 @@ bool same(const ReachedMotion& a, const ReachedMotion& b)
 }
 
 } // namespace
-
-std::vector<double> means_over(const std::vector<double>& samples, double length)
-{
-  std::vector<double> before(samples.size() + 1, 0.); // sums
-  std::partial_sum(samples.begin(), samples.end(), before.begin() + 1);
-  const auto sum_to = [&](double place)
-  {
-    const auto whole = std::min(static_cast<std::size_t>(place), samples.size() - 1);
-    return before[whole] + (place - static_cast<double>(whole)) * samples[whole];
-  };
-  std::vector<double> means;
-  for (double end = length; end <= static_cast<double>(samples.size()); end += length)
-    means.push_back((sum_to(end) - sum_to(end - length)) / length);
-  return means;
-}
 
 MeanValue frequency_of(const std::vector<double>& crossings)
 {

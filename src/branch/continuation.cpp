@@ -194,6 +194,45 @@ double range_passed(const BranchCorrector& corrector, const BranchSide& side, bo
   return upwards ? start - corrector.settings.least + passed : passed;
 }
 
+/// The orbit round a corner. Where contact begins or ends to do something the branch may turn at once: what closes
+/// beyond has its tangent by the contact there, and the parameter goes back.
+std::optional<CorrectedOrbit> step_round_corner(BranchCorrector& corrector, const CorrectedOrbit& from, Walk& walk)
+{
+  constexpr double longer = 5;
+  for (double length = longer * walk.least; length < walk.greatest; length *= longer)
+  {
+    BorderedVector beyond = vector_of(from);
+    add(length, walk.tangent, beyond);
+    corrector.family.set_parameter(beyond.parameter);
+    Orbit there = evaluate(problem_of(corrector), corrector.log, beyond.state, beyond.period);
+    if (!std::isfinite(there.residual)) return {};
+    Walk round{tangent_at(corrector, {std::move(there), beyond.parameter, 0}, walk.tangent), length, 0, 0};
+    if (round.tangent.parameter * walk.tangent.parameter > 0) scale(-1, round.tangent);
+    walk.length = length;
+    if (auto next = step_on(corrector, from, round, limited(corrector, round))) return next;
+  }
+  return {};
+}
+
+/// The next orbit, by shorter and shorter steps, then round a corner; none: no orbit closes near the last one.
+std::optional<CorrectedOrbit> next_orbit(BranchCorrector& corrector, const CorrectedOrbit& from, Walk& walk)
+{
+  while (walk.length >= walk.least)
+  {
+    const double length = limited(corrector, walk);
+    if (auto next = step_on(corrector, from, walk, length))
+    {
+      const double times = next->iterations <= 4 ? 1.5 : next->iterations > 7 ? 0.7 : 1;
+      walk.length = std::clamp(length * times, walk.least, walk.greatest);
+      return next;
+    }
+    walk.length = length / 2;
+    if (walk.length < walk.greatest / 50) // the last step was short, and its direction perhaps that of a kink
+      walk.tangent = tangent_at(corrector, from, walk.tangent);
+  }
+  return step_round_corner(corrector, from, walk);
+}
+
 /// Follows the branch from its start in the direction of the tangent.
 BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, BorderedVector tangent)
 {
@@ -214,28 +253,18 @@ BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, Border
   while (static_cast<int>(side.orbits.size()) <= 8 * points)
   {
     corrector.log.done = range_passed(corrector, side, upwards);
-    const double length = limited(corrector, walk);
-    std::optional<CorrectedOrbit> next = step_on(corrector, side.orbits.back().corrected, walk, length);
-    if (!next)
+    std::optional<CorrectedOrbit> next = next_orbit(corrector, side.orbits.back().corrected, walk);
+    bool goes_on = next.has_value();
+    if (goes_on)
     {
-      walk.length = length / 2;
-      if (walk.length < walk.greatest / 50) // the last step was short, and its direction perhaps that of a kink
-        walk.tangent = tangent_at(corrector, side.orbits.back().corrected, walk.tangent);
-      if (walk.length >= walk.least) continue;
-      side.ending = BranchEnding::step_too_small;
-      if (shrinks_to_a_point(side)) end_at_hopf(side);
-      return side;
+      refer_to(corrector, *next);
+      walk.tangent = direction_between(corrector, side.orbits.back().corrected, *next);
+      side.orbits.push_back(examine(corrector, std::move(*next), Examined::multipliers_too));
+      goes_on = !went_back(corrector, side);
+      if (!goes_on) side.orbits.pop_back();
     }
-    walk.length = std::clamp(length * (next->iterations <= 4  ? 1.5
-                                       : next->iterations > 7 ? 0.7
-                                                              : 1),
-                             walk.least, walk.greatest);
-    refer_to(corrector, *next);
-    walk.tangent = direction_between(corrector, side.orbits.back().corrected, *next);
-    side.orbits.push_back(examine(corrector, std::move(*next), Examined::multipliers_too));
-    if (went_back(corrector, side))
+    if (!goes_on)
     {
-      side.orbits.pop_back();
       side.ending = BranchEnding::step_too_small;
       if (shrinks_to_a_point(side)) end_at_hopf(side);
       return side;

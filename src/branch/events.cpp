@@ -243,15 +243,16 @@ std::optional<BranchEvent> crossing_among(BranchCorrector& corrector, const std:
 
 std::optional<BranchEvent> fold_among(BranchCorrector& corrector, const std::array<const ExaminedOrbit*, 3>& points)
 {
-  std::array<const ExaminedOrbit*, 3> now = points;
+  std::array<const ExaminedOrbit*, 3> now = points; // the middle one is furthest: the fold is there or beyond
   const auto parameter = [&](std::size_t i) { return now[i]->corrected.parameter; };
   // where the branch stands upright the parameter turns by the tolerance alone
   const double least = 1e-6 * corrector.scales.parameter;
   if (std::min(std::abs(parameter(1) - parameter(0)), std::abs(parameter(2) - parameter(1))) < least) return {};
   if (!((parameter(1) - parameter(0)) * (parameter(2) - parameter(1)) < 0)) return {};
-  std::array<ExaminedOrbit, 2> found;
-  BranchEvent event = event_at(BranchEventKind::fold, *points[1], 0.5 * std::abs(parameter(2) - parameter(0)));
-  for (ExaminedOrbit& fold : found)
+  const double outwards = parameter(1) > parameter(0) ? 1 : -1;
+  std::array<ExaminedOrbit, 4> found;
+  double error = 0.5 * std::abs(parameter(2) - parameter(0));
+  for (ExaminedOrbit& orbit : found)
   {
     const double before = distance(corrector, *now[0], *now[1]), after = distance(corrector, *now[1], *now[2]);
     const double at = vertex({-before, 0, after}, {parameter(0), parameter(1), parameter(2)});
@@ -259,14 +260,18 @@ std::optional<BranchEvent> fold_among(BranchCorrector& corrector, const std::arr
     const double part = std::clamp(at < 0 ? 1 + at / before : at / after, 0., 1.);
     std::optional<CorrectedOrbit> corrected = correct_between(corrector, *now[side], *now[side + 1], part);
     if (!corrected) break;
-    fold = examine(corrector, std::move(*corrected), Examined::measures_alone);
-    event = event_at(BranchEventKind::fold, fold, std::abs(fold.corrected.parameter - event.parameter));
-    now = side == 0 ? std::array{now[0], static_cast<const ExaminedOrbit*>(&fold), now[1]}
-                    : std::array{now[1], static_cast<const ExaminedOrbit*>(&fold), now[2]};
+    orbit = examine(corrector, std::move(*corrected), Examined::measures_alone);
+    const double further = outwards * (orbit.corrected.parameter - parameter(1));
+    error = std::abs(further);
+    if (further > 0)
+      now = side == 0 ? std::array{now[0], static_cast<const ExaminedOrbit*>(&orbit), now[1]}
+                      : std::array{now[1], static_cast<const ExaminedOrbit*>(&orbit), now[2]};
+    else
+      now[2 * side] = &orbit;
+    if (error < least) break;
   }
-  if (!alike(*now[0], *now[1]) || !alike(*now[1], *now[2]))
-    event.error = std::max(event.error, rise_to_corner(corrector, now));
-  return event;
+  if (!alike(*now[0], *now[1]) || !alike(*now[1], *now[2])) error = std::max(error, rise_to_corner(corrector, now));
+  return event_at(BranchEventKind::fold, *now[1], error);
 }
 
 } // namespace squeal

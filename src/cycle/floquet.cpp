@@ -152,30 +152,6 @@ bool alike(double limit, const std::vector<Complex>& a, const std::vector<Comple
   return have_partners(limit, a, b) && have_partners(limit, b, a);
 }
 
-/// The sliding modes that decay slowest, as states.
-std::vector<Owned<Vec>> slow_sliding_motions(const std::vector<ComplexMode>& modes, Vec pattern)
-{
-  constexpr std::size_t at_most = 60; // of which the search beside the slow motions takes a few
-  std::vector<const ComplexMode*> order;
-  for (const ComplexMode& mode : modes) order.push_back(&mode);
-  std::stable_sort(order.begin(), order.end(),
-                   [](const ComplexMode* a, const ComplexMode* b) { return a->lambda.real() > b->lambda.real(); });
-  order.resize(std::min(order.size(), at_most));
-  std::vector<Owned<Vec>> states;
-  for (const ComplexMode* mode : order)
-    for (const bool real : {true, false}) // the parts of phi e^{lambda t} at t = 0
-    {
-      const double a = mode->lambda.real(), b = mode->lambda.imag();
-      const Vec u = real ? mode->real.get() : mode->imaginary.get();
-      states.push_back(zeros_like(pattern));
-      check(VecCopy(u, displacement(states.back())));
-      const Vec v = velocity(states.back());
-      check(VecAXPY(v, a, u));
-      check(VecAXPY(v, real ? -b : b, real ? mode->imaginary.get() : mode->real.get()));
-    }
-  return states;
-}
-
 /// Real modes where the band of the complex ones ends too near the cycle's frequency for its multipliers.
 RealModes modes_beyond_band(const CycleProblem& problem)
 {
@@ -302,10 +278,11 @@ SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, int 
     none.missing = "the reduced model on the recorded contact has motions that the full one lacks";
     return none;
   }
-  SlowMotions slow = slow_motions_of(spectrum, *model, coordinates_in(*model, problem.sliding.structure), start);
+  const ReducedCoordinates coordinates = coordinates_in(*model, problem.sliding.structure);
+  SlowMotions slow = slow_motions_of(spectrum, *model, coordinates, start);
   slow.periods = none.periods;
   set_grid_errors(spectrum, own, other_steps, period, contacts, slow);
-  slow.others = slow_sliding_motions(problem.modes, start);
+  slow.without_known = taking_out_known(spectrum, coordinates);
   const bool whole = holds_every_motion(*model, eliminated_motions(problem, periods), start);
   slow.confirmed = [=, steps = map.steps, theta = map.theta, recorded = std::move(recorded), values = spectrum.values]
   {

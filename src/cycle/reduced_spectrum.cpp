@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <Eigen/LU>
 #include <Eigen/QR>
+#include <limits>
 
 namespace squeal
 {
@@ -101,6 +102,7 @@ ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<cons
 {
   const Index size = map.model.size(), slow = map.model.slow;
   const MatrixXd columns = monodromy(map, period, contacts);
+  constexpr LargeValues known{0.5, 0, std::numeric_limits<int>::max()};
   ReducedSpectrum result;
   MatrixXd right, left;
   on_rank_zero(map.comm,
@@ -109,23 +111,28 @@ ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<cons
                  const MatrixXd square = slow_rows(columns, size, slow);
                  const std::vector<DenseEigenpair> pairs = solve_dense_unsymmetric(square),
                                                    adjoint = solve_dense_unsymmetric(square.transpose());
-                 result.values = values_of(pairs);
-                 const std::size_t count = number_of(result.values, wanted);
-                 result.values.resize(count);
+                 result.known = values_of(pairs);
+                 const std::size_t count = std::max(number_of(result.known, wanted), number_of(result.known, known));
+                 result.known.resize(count);
                  right = real_columns(pairs, square.rows()).leftCols(static_cast<Index>(count));
                  const MatrixXd left_columns = real_columns(adjoint, square.rows());
                  left.resize(right.rows(), right.cols());
-                 const std::vector<std::size_t> places = nearest_places(result.values, values_of(adjoint));
+                 const std::vector<std::size_t> places = nearest_places(result.known, values_of(adjoint));
                  for (std::size_t i = 0; i < count; ++i)
                    left.col(static_cast<Index>(i)) = left_columns.col(static_cast<Index>(places[i]));
                });
-  broadcast_values(result.values, map.comm);
+  broadcast_values(result.known, map.comm);
   broadcast(right, map.comm);
   broadcast(left, map.comm);
+  result.known_right = orthonormal_columns(columns * right);
+  result.known_left = orthonormal_columns(left);
+  result.values = result.known;
+  result.values.resize(number_of(result.known, wanted));
+  const auto count = static_cast<Index>(result.values.size()); // leading columns span the vectors of leading values
   // what the slow coordinates miss of both comes with one more passage
-  result.right = columns * right;
-  result.left = apply_adjoint(map, period, contacts, with_fast_rows(left, size, slow));
-  for (MatrixXd* vectors : {&result.right, &result.left}) *vectors = orthonormal_columns(*vectors);
+  result.right = result.known_right.leftCols(count);
+  result.left = orthonormal_columns(
+      apply_adjoint(map, period, contacts, with_fast_rows(left.leftCols(count), size, slow)));
   result.columns = columns;
   return result;
 }
@@ -136,14 +143,27 @@ SlowMotions slow_motions_of(const ReducedSpectrum& spectrum, const ReducedModel&
   SlowMotions slow;
   slow.values = spectrum.values;
   slow.values.resize(number_of(spectrum.values, projected_values));
+  slow.next = slow.values.size() < spectrum.known.size() ? std::abs(spectrum.known[slow.values.size()]) : 0;
   slow.errors.assign(slow.values.size(), 0);
   slow.rises = slow.errors;
-  const auto count = static_cast<Index>(slow.values.size()); // leading columns span the vectors of leading values
+  const auto count = static_cast<Index>(slow.values.size());
   slow.right = motions_of(coordinates, spectrum.right.leftCols(count), pattern);
   slow.left = motions_of(coordinates, energy_representatives(model, spectrum.left.leftCols(count)), pattern);
   slow.correct = [coordinates, columns = spectrum.columns](Complex m, Vec real, Vec imaginary)
   { apply_resolvent(columns, coordinates, m, real, imaginary); };
   return slow;
+}
+
+std::function<void(Vec)> taking_out_known(const ReducedSpectrum& spectrum, const ReducedCoordinates& coordinates)
+{
+  const Index slow = spectrum.columns.cols() / 2, size = spectrum.columns.rows() / 2;
+  const Eigen::PartialPivLU<MatrixXd> gram(spectrum.known_left.transpose() *
+                                           slow_rows(spectrum.known_right, size, slow));
+  return [coordinates, size, slow, gram, right = spectrum.known_right, left = spectrum.known_left](Vec motion)
+  {
+    const MatrixXd x = slow_rows<MatrixXd>(coordinates.of(motion), size, slow);
+    coordinates.add(-right * gram.solve(left.transpose() * x), motion);
+  };
 }
 
 void add_changes(const std::vector<Complex>& others, double part, SlowMotions& slow)

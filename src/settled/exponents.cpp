@@ -75,16 +75,16 @@ void follow_period(const Flow& flow, TangentBundle& bundle)
   for (std::size_t k = 0; k < lengths.size(); ++k) bundle.growth[k].push_back(std::log(lengths[k]));
 }
 
-std::vector<MeanValue> exponents_of(const TangentBundle& bundle, std::size_t skipped)
+std::vector<MeanValue> exponents_of(const TangentBundle& bundle, std::size_t skipped, double windows)
 {
   std::vector<MeanValue> exponents;
   for (const std::vector<double>& growth : bundle.growth)
   {
     if (growth.size() < skipped + 4) return {};
     const std::span<const double> counted = std::span(growth).subspan(skipped);
-    MeanValue exponent = batch_mean(counted);
-    exponent.error += std::numbers::ln2 / static_cast<double>(counted.size());
-    exponents.push_back(exponent);
+    const MeanValue mean = batch_mean(counted);
+    const double shear = std::numbers::ln2 / static_cast<double>(counted.size());
+    exponents.push_back({windows * mean.value, windows * (mean.error + shear)});
   }
   std::stable_sort(exponents.begin(), exponents.end(),
                    [](const MeanValue& a, const MeanValue& b) { return a.value > b.value; });

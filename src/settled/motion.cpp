@@ -20,19 +20,18 @@ MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencie
     return {
         MotionKind::undecided, "quasi-periodic and weakly irregular",
         "neither the probe that swings most nor the normal force shows a second frequency: a [[probe]] elsewhere, or "
-        "more periods (-settled_periods)"};
+        "more periods"};
   if (base.explained < 0.8)
     return {MotionKind::undecided, "quasi-periodic and weakly irregular",
-            format("%.0f %% of the side bands are at combinations of two frequencies: more periods would decide "
-                   "(-settled_periods)",
+            format("%.0f %% of the side bands are at combinations of two frequencies: more periods would decide",
                    100 * base.explained)};
   // Had the modulation decayed to a half, the window would show it.
   const double slowest = std::log(2.) / length;
   if (decay.value - decay.error <= 0 && decay.value + decay.error < slowest)
     return {MotionKind::quasi_periodic, "", ""};
   return {MotionKind::undecided, "quasi-periodic and a slow decay to a cycle",
-          format("the modulation decays by %.1e +- %.1e a period: %.0f periods more would decide (-settled_periods)",
-                 decay.value, decay.error, 3 / std::max({decay.value, decay.error, 1e-6}))};
+          format("the modulation decays by %.1e +- %.1e a period: %.0f periods more would decide", decay.value,
+                 decay.error, 3 / std::max({decay.value, decay.error, 1e-6}))};
 }
 
 /// Of an exponent above zero. A mean's bar comes from batches, and a series shorter than some 50 correlation times has
@@ -43,8 +42,7 @@ MotionVerdict judge_irregular(std::span<const double> energies)
   const double needed = enough * correlation_time(energies);
   if (static_cast<double>(energies.size()) >= needed) return {MotionKind::irregular, "", ""};
   return {MotionKind::undecided, "an irregular motion and one that still changes",
-          format("its energy wanders slowly, and means may be off by more than their bars: %.2g periods would decide "
-                 "(-settled_periods)",
+          format("its energy wanders slowly, and means may be off by more than their bars: %.2g periods would decide",
                  needed)};
 }
 
@@ -68,32 +66,72 @@ bool parted(const std::vector<MeanValue>& exponents, double together)
   return first.value - together * first.error > second.value + together * second.error;
 }
 
-/// Appends what was seen of a period.
-void append(const PeriodSample& sample, ExaminedMotion& motion)
+double swing(std::span<const double> series)
 {
-  motion.channels.resize(sample.means.size());
-  for (std::size_t i = 0; i < sample.means.size(); ++i) motion.channels[i].push_back(sample.means[i]);
-  motion.coordinate.insert(motion.coordinate.end(), sample.coordinate.begin(), sample.coordinate.end());
-  motion.beside.insert(motion.beside.end(), sample.beside.begin(), sample.beside.end());
+  const auto [least, greatest] = std::ranges::minmax(series);
+  return greatest - least;
 }
 
-/// All that is said of the motion so far.
-void examine(const TangentBundle& bundle, double period, ExaminedMotion& motion)
+/// Swings within successive periods of so many samples, a broken number.
+std::vector<double> swings_over(std::span<const double> samples, double length)
 {
-  const std::size_t periods = motion.periods();
-  const std::size_t samples = motion.coordinate.size() / periods; // a period
-  motion.discarded = values_before_stationary(motion.channels.front());
-  const std::size_t first = motion.discarded < periods ? motion.discarded : periods / 2;
+  std::vector<double> swings;
+  for (double end = length; end <= static_cast<double>(samples.size()); end += length)
+  {
+    const auto first = static_cast<std::size_t>(end - length), last = static_cast<std::size_t>(end);
+    swings.push_back(swing(samples.subspan(first, last - first)));
+  }
+  return swings;
+}
+
+/// The series of the spectrum: what swings most from a sample on.
+const std::vector<double>& follow(const MotionSeries& series, std::size_t first, ExaminedMotion& motion)
+{
+  const auto largest = std::ranges::max_element(
+      series.moving, {}, [&](const std::vector<double>& one) { return swing(std::span(one).subspan(first)); });
+  motion.followed = largest == series.moving.end() ? -1 : static_cast<int>(largest - series.moving.begin());
+  return motion.followed < 0 ? series.beside : *largest;
+}
+
+/// The period of the lines; the window where the steps, or what was seen of them, are too few for it.
+double own_period(const BaseFrequencies& base, double window, double step, double seen)
+{
+  constexpr double fewest_steps = 8, fewest_periods = 16;
+  const double period = period_of(base);
+  return period >= fewest_steps * step && fewest_periods * period <= seen ? period : window;
+}
+
+/// All that is said of the motion so far. What comes before it was stationary is left out by windows first, so that
+/// its lines are not of motions that decay.
+void examine(const TangentBundle& bundle, double window, const MotionSeries& series, ExaminedMotion& motion)
+{
+  const std::size_t samples = series.averaged.front().size(), windows = motion.windows, of_window = samples / windows;
+  const double step = window / static_cast<double>(of_window);
+  const auto left_out = [](std::size_t discarded, std::size_t all) { return discarded < all ? discarded : all / 2; };
+  const std::size_t early =
+      values_before_stationary(means_over(series.averaged.front(), static_cast<double>(of_window)));
+  const std::size_t first_sample = left_out(early, windows) * of_window;
+  const auto spectrum = [&](const std::vector<double>& of)
+  { return spectrum_of(std::span(of).subspan(first_sample), step); };
+  motion.spectrum = spectrum(follow(series, first_sample, motion));
+  motion.base = base_frequencies(motion.spectrum);
+  motion.period = own_period(motion.base, window, step, static_cast<double>(samples - first_sample) * step);
+  if (motion.base.second == 0 && motion.followed >= 0 && !series.beside.empty())
+    motion.base = base_frequencies(spectrum(series.beside), motion.base.first);
+
+  const double length = motion.period / step;
+  motion.channels.clear();
+  for (const auto& one : series.averaged) motion.channels.push_back(means_over(one, length));
+  for (const auto& one : series.moving) motion.channels.push_back(swings_over(one, length));
+  const std::span<const double> energies = motion.channels.front();
+  motion.discarded = values_before_stationary(energies);
+  const std::size_t first = left_out(motion.discarded, motion.periods());
   motion.means.clear();
   for (const auto& channel : motion.channels) motion.means.push_back(batch_mean(std::span(channel).subspan(first)));
-  motion.exponents = exponents_of(bundle, std::max(first, periods / 4));
-  const double step = period / static_cast<double>(std::max<std::size_t>(samples, 1));
-  motion.spectrum = spectrum_of(std::span(motion.coordinate).subspan(first * samples), step);
-  motion.base = base_frequencies(motion.spectrum);
-  if (motion.base.second == 0 && !motion.beside.empty())
-    motion.base =
-        base_frequencies(spectrum_of(std::span(motion.beside).subspan(first * samples), step), motion.base.first);
-  motion.verdict = judge_motion(motion.exponents, std::span(motion.channels.front()).subspan(first), motion.base);
+  const double windows_of_period = motion.period / window;
+  const auto first_window = static_cast<std::size_t>(static_cast<double>(first) * windows_of_period);
+  motion.exponents = exponents_of(bundle, std::max(first_window, windows / 4), windows_of_period);
+  motion.verdict = judge_motion(motion.exponents, energies.subspan(first), motion.base);
   const bool cycle = motion.verdict.kind == MotionKind::periodic && motion.base.closes_after == 0;
   if (cycle) motion.base.second = motion.base.explained = 0; // by the exponents: that line is rounding, or dies out
 }
@@ -103,7 +141,7 @@ void examine(const TangentBundle& bundle, double period, ExaminedMotion& motion)
 MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<const double> energies,
                            const BaseFrequencies& base)
 {
-  const std::string more = "more periods would decide (-settled_periods)";
+  const std::string more = "more periods would decide";
   if (!is_stationary(energies))
     return {MotionKind::undecided, "a motion that still changes and one that wanders slowly", more};
   if (exponents.empty()) return {MotionKind::undecided, "all kinds, without Lyapunov exponents", more};
@@ -126,7 +164,7 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
           format("%ld exponents are zero within their bars: ", static_cast<long>(zero)) + more};
 }
 
-ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, Vec state, double period,
+ExaminedMotion examine_motion(const Flow& flow, const ObservedMotion& observed, Vec state,
                               const SettledOptions& options)
 {
   ExaminedMotion motion;
@@ -136,15 +174,17 @@ ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, Ve
   std::size_t target = std::min<std::size_t>(128, most);
   for (;; target = std::min(2 * target, most))
   {
-    while (motion.periods() < target)
+    while (motion.windows < target)
     {
-      const PeriodSample sample = sampler(state);
-      append(sample, motion);
+      const double energy = observed.advance(state);
       follow_period(flow, bundle);
-      progress.update(static_cast<double>(motion.periods()), format("energy %.4g", sample.means.front()));
+      progress.update(static_cast<double>(++motion.windows), format("energy %.4g", energy));
     }
-    examine(bundle, period, motion);
-    if (motion.verdict.kind != MotionKind::undecided || target == most) return motion;
+    examine(bundle, observed.window, observed.series(), motion);
+    if (motion.verdict.kind != MotionKind::undecided) return motion;
+    if (target < most) continue;
+    motion.verdict.would_decide += format(" (-settled_periods %zu)", 4 * most);
+    return motion;
   }
 }
 

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace squeal
 {
@@ -36,43 +35,43 @@ void append(const History& from, History& to)
   for (std::size_t i = 0; i < from.probes.size(); ++i) join("", "", from.probes[i], to.probes[i]);
 }
 
-double swing(const std::vector<double>& probe)
+MotionSeries series_of(const History& history)
 {
-  const auto [least, greatest] = std::minmax_element(probe.begin(), probe.end());
-  return *greatest - *least;
+  const auto counted = [](const std::vector<int>& pairs) { return std::vector<double>(pairs.begin(), pairs.end()); };
+  return {{history.fluctuating_energy, history.energy, history.damping_power, history.contact_power, history.load_power,
+           counted(history.open), counted(history.stick), counted(history.slip)},
+          history.probes,
+          history.normal_force};
 }
 
-/// The probe that swings most in a period; -1 without probes.
-int largest_probe(const History& history)
-{
-  const auto largest = std::max_element(history.probes.begin(), history.probes.end(),
-                                        [](const auto& a, const auto& b) { return swing(a) < swing(b); });
-  return history.probes.empty() ? -1 : static_cast<int>(largest - history.probes.begin());
-}
-
-const std::vector<double>& series_of(const History& history, int probe)
+const std::vector<double>& followed_series(const History& history, int probe)
 {
   return probe < 0 ? history.normal_force : history.probes[static_cast<std::size_t>(probe)];
 }
 
-PeriodSample sample_of(const History& history, int probe)
+/// The windows of time that a motion is integrated by.
+struct Windows
 {
-  PeriodSample sample{{mean(history.fluctuating_energy), mean(history.energy), mean(history.damping_power),
-                       mean(history.contact_power), mean(history.load_power), mean(history.open), mean(history.stick),
-                       mean(history.slip)},
-                      series_of(history, probe),
-                      probe < 0 ? std::vector<double>() : history.normal_force};
-  for (const auto& one : history.probes) sample.means.push_back(swing(one));
-  return sample;
+  const CycleProblem& problem;
+  double length, theta; // [s]
+  int steps;
+};
+
+/// A map of a window, in so many steps.
+PeriodMap map_of(const Windows& windows, int steps)
+{
+  PeriodMap map{windows.problem.sliding, windows.problem.step, steps, windows.theta};
+  map.reactions = windows.problem.sliding.equilibrium.reactions;
+  set_period(map, windows.length);
+  return map;
 }
 
-/// Integrates one period of the brake, recorded for its tangent. Appends its history to the motion's, and samples to
-/// its shapes.
-PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, PetscInt shapes, SettledMotion& motion)
+/// Integrates one window of the brake, recorded for its tangent. Appends its history to the motion's, and samples to
+/// its shapes. Returns its mean fluctuating energy.
+double integrate_window(PeriodMap& map, Mat probe_rows, Vec state, PetscInt shapes, SettledMotion& motion)
 {
   History& all = motion.history;
-  const bool first = all.time.empty();
-  const double begun = first ? 0 : all.time.back();
+  const double begun = all.time.empty() ? 0 : all.time.back();
   State now{copy_of(displacement(state)), copy_of(velocity(state)), begun, map.reactions};
   map.records.clear();
   map.records.resize(static_cast<std::size_t>(map.steps));
@@ -93,8 +92,7 @@ PeriodSample integrate_period(PeriodMap& map, Mat probe_rows, Vec state, PetscIn
   check(VecCopy(now.u, displacement(state)));
   check(VecCopy(now.v, velocity(state)));
   append(history, all);
-  if (first) motion.spectrum_probe = largest_probe(history);
-  return sample_of(history, motion.spectrum_probe);
+  return mean(history.fluctuating_energy);
 }
 
 /// Names the parts of what was examined.
@@ -113,8 +111,8 @@ void name_means(SettledMotion& motion, int pairs)
   motion.stick_fraction = fraction(stick_pairs);
   motion.slip_fraction = fraction(slip_pairs);
   motion.peak_to_peak.assign(means.begin() + probes, means.end());
-  const auto kept = std::span(motion.examined.channels[fluctuating_energy])
-                        .subspan(motion.examined.discarded % motion.examined.periods());
+  const ExaminedMotion& seen = motion.examined;
+  const auto kept = std::span(seen.channels[fluctuating_energy]).subspan(seen.discarded % seen.periods());
   const auto [least, greatest] = std::minmax_element(kept.begin(), kept.end());
   motion.least_energy = *least;
   motion.greatest_energy = *greatest;
@@ -137,63 +135,59 @@ double nearest_line(const Spectrum& spectrum, double frequency)
 }
 
 /// Sets what half as many steps a period change, from where the motion ends: the mean fluctuating energy, and as part
-/// of their bars the frequencies of lines. Seen is the second half of as many periods as cost a quarter of the motion's
+/// of their bars the frequencies of lines. Seen is the second half of as many windows as cost a quarter of the motion's
 /// own.
-void add_step_errors(const CycleProblem& problem, double theta, Vec end, SettledMotion& motion)
+void add_step_errors(const Windows& windows, Vec end, SettledMotion& motion)
 {
-  PeriodMap map{problem.sliding, problem.step, std::max(motion.steps_per_period / 2, 1), theta};
-  set_period(map, motion.period);
+  const CycleProblem& problem = windows.problem;
+  PeriodMap map = map_of(windows, std::max(windows.steps / 2, 1));
   State now{copy_of(displacement(end)), copy_of(velocity(end)), 0, problem.sliding.equilibrium.reactions};
-  std::vector<double> energies, signal;
-  const std::size_t periods = std::max<std::size_t>(motion.examined.periods() / 2, 1);
-  while (energies.size() < periods)
+  History history;
+  const std::size_t count = std::max<std::size_t>(motion.examined.windows / 2, 1), half = count / 2;
+  for (std::size_t k = 0; k < count; ++k)
   {
-    History history;
+    if (k == half) history = {};
     if (march(map.step, map.sliding, map.steps, now, {problem.probes, history, nullptr}).interrupted)
       throw Interrupted{};
-    energies.push_back(mean(history.fluctuating_energy));
-    const std::vector<double>& series = series_of(history, motion.spectrum_probe);
-    if (energies.size() > periods / 2) signal.insert(signal.end(), series.begin(), series.end());
   }
-  motion.step_error =
-      std::abs(batch_mean(std::span(energies).subspan(periods / 2)).value - motion.fluctuating_energy.value);
+  const double step = windows.length / map.steps;
+  const std::vector<double> energies = means_over(history.fluctuating_energy, motion.examined.period / step);
+  motion.step_error = std::abs(batch_mean(energies).value - motion.fluctuating_energy.value);
   const double first = motion.examined.base.first;
-  const double part = std::abs(nearest_line(spectrum_of(signal, motion.period / map.steps), first) / first - 1);
+  const Spectrum spectrum = spectrum_of(followed_series(history, motion.examined.followed), step);
+  const double part = std::abs(nearest_line(spectrum, first) / first - 1);
   for (Line& line : motion.examined.spectrum.lines)
     if (std::isfinite(part)) line.frequency_error += part * line.frequency_hz;
 }
 
-/// The largest exponent with four times as many steps a period, from where the motion ends, over as many periods as
+/// The largest exponent with four times as many steps a period, from where the motion ends, over as many windows as
 /// cost a quarter of what the motion did, or 32. Its first quarter is left out, where the tangent turns to what grows
 /// most.
-MeanValue exponent_by_finer_steps(const CycleProblem& problem, const SettledMotion& motion, double theta, Vec end)
+MeanValue exponent_by_finer_steps(const Windows& windows, const SettledMotion& motion, Vec end)
 {
   constexpr int finer = 4;
   constexpr std::size_t fewest = 32;
-  PeriodMap map{problem.sliding, problem.step, finer * motion.steps_per_period, theta};
-  map.reactions = problem.sliding.equilibrium.reactions;
+  PeriodMap map = map_of(windows, finer * windows.steps);
   Flow flow = flow_of(map);
-  set_period(map, motion.period);
   SettledMotion fine;
   const Owned<Vec> state = copy_of(end);
   TangentBundle bundle = make_bundle(flow, state, 1);
-  const std::size_t periods = std::max(motion.examined.periods() / (4 * finer), fewest);
-  for (std::size_t k = 0; k < periods; ++k)
+  const std::size_t count = std::max(motion.examined.windows / (4 * finer), fewest);
+  for (std::size_t k = 0; k < count; ++k)
   {
     fine.history = {};
-    integrate_period(map, problem.probes, state, 0, fine);
+    integrate_window(map, windows.problem.probes, state, 0, fine);
     follow_period(flow, bundle);
   }
-  return exponents_of(bundle, periods / 4).front();
+  return exponents_of(bundle, count / 4, motion.examined.period / windows.length).front();
 }
 
 /// An exponent above zero that four times as many steps change by more than both bars, and by a tenth, is of the grid
 /// of time: masses that contact hits within steps, or feet without mass, scatter a motion that is regular.
-void hold_against_finer_steps(const CycleProblem& problem, double theta, Vec end, SettledMotion& motion)
+void hold_against_finer_steps(const Windows& windows, Vec end, SettledMotion& motion)
 {
   if (motion.examined.verdict.kind != MotionKind::irregular) return;
-  const MeanValue coarse = motion.examined.exponents.front(),
-                  fine = exponent_by_finer_steps(problem, motion, theta, end);
+  const MeanValue coarse = motion.examined.exponents.front(), fine = exponent_by_finer_steps(windows, motion, end);
   if (!(std::abs(coarse.value - fine.value) <= coarse.error + fine.error + 0.1 * coarse.value)) // NaN does not confirm
     leave_to_finer_steps(
         motion, format("four times as many change the largest exponent to %.2g +- %.1g", fine.value, fine.error));
@@ -208,8 +202,9 @@ void leave_to_finer_steps(SettledMotion& motion, const std::string& seen)
   verdict.between =
       format("%s and what finer steps than %d a period would show", word(verdict.kind), motion.steps_per_period);
   verdict.would_decide = (seen.empty() ? "" : seen + ": ") +
-                         std::string("steps that change neither the energy nor the largest exponent would decide "
-                                     "(cycle.steps_per_period)");
+                         format("steps that change neither the energy nor the largest exponent would decide "
+                                "(--set cycle.steps_per_period=%d)",
+                                4 * motion.steps_per_period);
   verdict.kind = MotionKind::undecided;
   note_undecided(motion);
 }
@@ -230,28 +225,28 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
 {
   const double of_period = cycle.steps_per_period * work_of_step(problem.sliding.structure);
   if (options.periods == 0) options.periods = is_dear(of_period) ? 512 : 2048;
+  const Windows windows{problem, cycle.free.period, cycle.theta, cycle.steps_per_period};
+  const double step = windows.length / windows.steps;
   SettledMotion motion;
-  PeriodMap map{problem.sliding, problem.step, cycle.steps_per_period, cycle.theta};
-  map.reactions = problem.sliding.equilibrium.reactions;
+  PeriodMap map = map_of(windows, windows.steps);
   Flow flow = flow_of(map);
-  set_period(map, cycle.free.period);
-  motion.steps_per_period = cycle.steps_per_period;
-  motion.period = cycle.free.period;
   Owned<Vec> state = copy_of(cycle.free.state.get());
   motion.shapes = no_shapes(problem.sliding.structure.M);
-  motion.sampled_steps = steps_between_samples(motion.steps_per_period, motion.period / motion.steps_per_period);
-  const auto sampler = [&](Vec now) { return integrate_period(map, problem.probes, now, options.shapes, motion); };
-  motion.examined = examine_motion(flow, sampler, state, motion.period, options);
+  motion.sampled_steps = steps_between_samples(windows.steps, step);
+  const auto advance = [&](Vec now) { return integrate_window(map, problem.probes, now, options.shapes, motion); };
+  const auto series = [&] { return series_of(motion.history); };
+  motion.examined = examine_motion(flow, {windows.length, advance, series}, state, options);
+  const ExaminedMotion& seen = motion.examined;
+  motion.steps_per_period = static_cast<int>(std::lround(seen.period / step));
   name_means(motion, problem.sliding.interface.pairs);
   motion.end = {copy_of(displacement(state)), copy_of(velocity(state)), motion.history.time.back(), map.reactions};
-  const std::size_t windows = motion.examined.periods(), samples = motion.shapes.squares.size() / windows;
-  keep_strongest(motion.shapes, motion.examined.discarded % windows * samples);
-  add_step_errors(problem, cycle.theta, state, motion);
-  const bool stationary = motion.examined.discarded < motion.examined.periods();
-  motion.outcome = {OutcomeKind::settled, "", static_cast<int>(motion.examined.periods()), 0};
-  if (!stationary) motion.outcome.kind = OutcomeKind::not_converged;
+  const double discarded = static_cast<double>(seen.discarded % seen.periods()) * seen.period;
+  keep_strongest(motion.shapes, static_cast<std::size_t>(discarded / step / motion.sampled_steps));
+  add_step_errors(windows, state, motion);
+  motion.outcome = {OutcomeKind::settled, "", static_cast<int>(seen.periods()), 0};
+  if (seen.discarded == seen.periods()) motion.outcome.kind = OutcomeKind::not_converged;
   note_undecided(motion);
-  hold_against_finer_steps(problem, cycle.theta, state, motion);
+  hold_against_finer_steps(windows, state, motion);
   return motion;
 }
 

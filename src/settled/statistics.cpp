@@ -40,6 +40,21 @@ double batch_error(std::span<const double> series, std::size_t count, double stu
 
 } // namespace
 
+std::vector<double> means_over(const std::vector<double>& samples, double length)
+{
+  std::vector<double> before(samples.size() + 1, 0.); // sums
+  std::partial_sum(samples.begin(), samples.end(), before.begin() + 1);
+  const auto sum_to = [&](double place)
+  {
+    const auto whole = std::min(static_cast<std::size_t>(place), samples.size() - 1);
+    return before[whole] + (place - static_cast<double>(whole)) * samples[whole];
+  };
+  std::vector<double> means;
+  for (double end = length; end <= static_cast<double>(samples.size()); end += length)
+    means.push_back((sum_to(end) - sum_to(end - length)) / length);
+  return means;
+}
+
 MeanValue batch_mean(std::span<const double> series)
 {
   if (series.empty()) return {std::nan(""), std::nan("")};

@@ -15,30 +15,20 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-constexpr Index of_motions = 4, at_random = 2; // columns of a block
+constexpr Index of_block = 6, at_random = 2; // columns, and those that are random at least
 // Few powers of few motions may be bounded where another one grows: the residual of a Ritz value says nothing of what
 // the space has not. Four blocks have seen what every motion of a random start becomes in four periods.
 constexpr long least_blocks = 4;
 
-/// The motions that are least in V, and random velocities, in which every mode has its part.
-StateBlock start_beside(const Monodromy& monodromy, const Projector& projector, const std::vector<Owned<Vec>>& motions)
+/// The first motions, and random velocities, in which every mode has its part.
+StateBlock start_beside(const Monodromy& monodromy, const std::vector<Owned<Vec>>& motions)
 {
-  constexpr double enough = 0.1; // of a motion's norm
-  StateBlock X = block_of(motions);
-  const auto norms = [&](const StateBlock& of)
-  { return Eigen::VectorXd(inner_products(of, energy_images(monodromy.flow, of)).diagonal().cwiseSqrt()); };
-  const Eigen::VectorXd before = norms(X);
-  deflate(projector, X);
-  const Eigen::VectorXd after = norms(X);
-  std::vector<Index> taken;
-  for (Index k = 0; k < X.columns() && static_cast<Index>(taken.size()) < of_motions; ++k)
-    if (after(k) > enough * before(k)) taken.push_back(k);
-  StateBlock start{{X.u.comm, X.u.entries(Eigen::all, taken)}, {X.v.comm, X.v.entries(Eigen::all, taken)}};
-  MultiVector velocities = random_multivector(monodromy.flow.M, at_random), none = velocities;
+  const auto given = std::min(motions.size(), static_cast<std::size_t>(of_block - at_random));
+  MultiVector velocities = random_multivector(monodromy.flow.M, of_block - static_cast<Index>(given)),
+              none = velocities;
   none.entries.setZero();
-  StateBlock random{std::move(none), std::move(velocities)};
-  deflate(projector, random);
-  append(start, random);
+  StateBlock start{std::move(none), std::move(velocities)};
+  if (given > 0) append(start, block_of(std::span(motions).first(given)));
   return start;
 }
 
@@ -61,14 +51,14 @@ void set_pair(const MatrixXd& H, const MatrixXd& remainder, const SearchChoice& 
 
 } // namespace
 
-DeflatedSearch search_beside(const Monodromy& monodromy, const Projector& projector,
+DeflatedSearch search_beside(const Monodromy& monodromy, const Deflation& deflation,
                              const std::vector<Owned<Vec>>& motions, Index columns, const SearchChoice& choice)
 {
   const Flow& flow = monodromy.flow;
   DeflatedSearch search;
-  search.bounded = motions.empty(); // V holds every motion that may decay slowly
-  if (motions.empty()) return search;
-  StateBlock block = orthonormal(flow, start_beside(monodromy, projector, motions), 1e-6);
+  StateBlock block = start_beside(monodromy, motions);
+  deflation(block);
+  block = orthonormal(flow, std::move(block), 1e-6);
   search.bounded = block.columns() == 0;
   if (search.bounded) return search;
   search.Q = block;
@@ -77,7 +67,7 @@ DeflatedSearch search_beside(const Monodromy& monodromy, const Projector& projec
   {
     StateBlock image = image_of(monodromy, block);
     search.columns += static_cast<long>(image.columns());
-    deflate(projector, image);
+    deflation(image);
     const StateBlock images = energy_images(flow, search.Q);
     MatrixXd along = MatrixXd::Zero(search.Q.columns(), block.columns());
     for (int pass = 0; pass < 2; ++pass)
@@ -123,8 +113,8 @@ FloquetAnalysis multipliers_by_search(const Monodromy& monodromy, const std::vec
   const auto search_on = [&](const TimeGrid& grid)
   {
     flow.record_period(orbit.period, orbit.state, grid);
-    const StateBlock none{empty_multivector(flow.M), empty_multivector(flow.M)};
-    DeflatedSearch search = search_beside(monodromy, {none, none}, motions, columns, {beside_shift, settled});
+    const Deflation nothing = [](StateBlock&) {};
+    DeflatedSearch search = search_beside(monodromy, nothing, motions, columns, {beside_shift, settled});
     multipliers.periods += search.columns;
     return search;
   };

@@ -1,5 +1,5 @@
 #pragma once
-/// The largest Ritz values of (1 - V (W'V)^-1 W') dPhi_T/dx, in a block Arnoldi space (src/README.md, section 6.9).
+/// The largest Ritz values of dPhi_T/dx beside known motions, in a block Arnoldi space (src/README.md, section 6.9).
 #include "oblique_projector.hpp"
 
 namespace squeal
@@ -22,9 +22,11 @@ struct SearchChoice
   std::function<bool(const DeflatedSearch&)> ends; // asked after four blocks
 };
 
-/// Searches from the motions that are least in V, with at most `columns` columns beyond the first block. Without
-/// motions V holds every motion that may decay slowly. Collective.
-DeflatedSearch search_beside(const Monodromy& monodromy, const Projector& projector,
+/// Takes from each column what is known.
+using Deflation = std::function<void(StateBlock&)>;
+
+/// Searches from motions and random velocities, with at most `columns` columns beyond the first block. Collective.
+DeflatedSearch search_beside(const Monodromy& monodromy, const Deflation& deflation,
                              const std::vector<Owned<Vec>>& motions, Eigen::Index columns, const SearchChoice& choice);
 
 /// The largest multiplier, sought from motions that may grow. Bars: twice the residual of its Ritz pair and what other

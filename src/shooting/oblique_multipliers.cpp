@@ -3,8 +3,8 @@
 /// has:
 ///     A = dPhi_T/dx,     (W'Q)^-1 W'A Q y = m y,     bar_i = 2 |m_i - its last value| + errors_i.
 /// Where a bar reaches across 1, Q takes in (A_r - m)^-1 (A - m) Q y, A_r the reduced model's matrix (Davidson
-/// 1975). The largest Ritz values of (1 - V (W'V)^-1 W') A, V = Q y, are sought in a block Arnoldi space. Where
-/// they are below 1 by more than their residuals, no larger multiplier is to be expected. That is likely, not
+/// 1975). The largest Ritz values of A beside V = Q y, and beside what A_r knows, are sought in a block Arnoldi space.
+/// Where they are below 1 by more than their residuals, no larger multiplier is to be expected. That is likely, not
 /// proven.
 #include "deflated_search.hpp"
 #include "squeal/base/cost.hpp"
@@ -294,6 +294,31 @@ void take_out_shift(Passes& passes)
     bars->erase(bars->begin() + static_cast<std::ptrdiff_t>(place));
 }
 
+/// Whether the values of the approximation that were not refined stay below 1 by twice the largest error of those that
+/// were.
+bool others_decay(const SlowMotions& slow, const Passes& passes)
+{
+  double error = 0;
+  for (std::size_t i = 0; i < slow.values.size(); ++i)
+    error = std::max(error, std::abs(passes.pairs[i].lambda - slow.values[i]));
+  return slow.next + 2 * error < 1;
+}
+
+/// Takes out the wanted vectors, after what the approximation knows where its other values can be relied on.
+Deflation beside_known(const Monodromy& monodromy, const SlowMotions& slow, const Passes& passes)
+{
+  return [&, reliable = others_decay(slow, passes)](StateBlock& X)
+  {
+    if (reliable)
+    {
+      const std::vector<Owned<Vec>> states = states_of(X, monodromy.orbit.state);
+      for (const Owned<Vec>& state : states) slow.without_known(state);
+      X = block_of(states);
+    }
+    deflate(passes.wanted, X);
+  };
+}
+
 Completeness coverage_of(const SlowMotions& slow, const DeflatedSearch& search)
 {
   if (!slow.confirmed())
@@ -322,7 +347,10 @@ std::string make_complete(const Monodromy& monodromy, const SlowMotions& slow, I
     if (std::string refusal = make_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
     coverage = {true, ""}; // a multiplier above 1 needs no other
     if (repels(passes)) return {};
-    const DeflatedSearch search = search_beside(monodromy, passes.wanted, slow.others, columns, largest_or_bounded);
+    coverage = coverage_of(slow, {true});
+    if (!slow.without_known) return {};
+    const DeflatedSearch search =
+        search_beside(monodromy, beside_known(monodromy, slow, passes), {}, columns, largest_or_bounded);
     searched += search.columns;
     coverage = coverage_of(slow, search);
     if (search.bounded || round == rounds) return {};

@@ -87,7 +87,7 @@ class TwoBlocks:
             text += f"*SOLID SECTION, ELSET={name.upper()}, MATERIAL=OF_{name.upper()}\n"
         if self.kind != "tet10":
             text += "*SURFACE, NAME=upper\nplate, S2\n"
-        text += "*BOUNDARY\nplate_clamp, ENCASTRE\npad_top, 1, 2\n*CONTACT PAIR, INTERACTION=i\npad_bottom, upper\n"
+        text += "*BOUNDARY\nplate_clamp, ENCASTRE\npad_top, 1, 2\n"
         file.write_text(text)
 
     def write_parts(self, file):
@@ -189,11 +189,11 @@ def convert(deck, folder, *words):
 
 
 def completed(scene, names):
-    """The skeleton with what its comments ask for."""
+    """The scene with a contact and what acts on it, which these decks do not have."""
     text = scene.read_text()
-    assert "FILL IN" in text
+    assert "FILL IN [" not in text and "[[contact]]" not in text
     extra = write_scene(scene.parent.parent, **contact(*names)).read_text()
-    scene.write_text(text.replace("# coefficient = 0.3", "coefficient = 0.4") + extra + '\n[modes]\nmethod = "full"\nband = 20000\n\n[estimate]\nenabled = false\n')
+    scene.write_text(text + extra + '\n[friction]\ncoefficient = 0.4\n\n[modes]\nmethod = "full"\nband = 20000\n\n[estimate]\nenabled = false\n')
     return scene
 
 
@@ -259,15 +259,16 @@ def test_shells_units_and_what_is_missing(squeal, tmp_path):
     """A deck in mm, N and t: SI in the scene. What the deck lacks is a comment, and squeal names it."""
     text = "*NODE\n1,0,0,0\n2,10,0,0\n3,10,10,0\n4,0,10,0\n*ELEMENT, TYPE=S4R, ELSET=skin\n5,1,2,3,4\n*NSET, NSET=edge\n1,4\n"
     text += "*MATERIAL, NAME=steel\n*ELASTIC\n210000., 0.3\n*DENSITY\n7.85e-9\n*SHELL SECTION, ELSET=skin, MATERIAL=steel\n2.,5\n"
-    (tmp_path / "shell.inp").write_text(text + "*BOUNDARY\nedge, 1, 6\n*CLOAD\n2, 3, 1.\n")
+    (tmp_path / "shell.inp").write_text(text + "*BOUNDARY\nedge, 1, 6\n*CLOAD\n2, 3, 4.\n*TEMPERATURE\n2, 3.\n")
     scene = convert(tmp_path / "shell.inp", tmp_path / "out", "--length", "0.001")
     content = tomllib.loads(scene.read_text())
     assert content["part"] == [{"name": "skin", "young": 210e9, "poisson": 0.3, "density": 7850, "thickness": 0.002}]
     assert content["support"] == [{"on": "edge", "fixed": "all"}] and content["mesh"]["scale"] == 0.001
-    assert "*CLOAD (line 19)" in scene.read_text()
+    assert content["force"] == [{"on": "node_2", "vector": [0, 0, 4]}]
+    assert "*TEMPERATURE (line 21)" in scene.read_text()
     (tmp_path / "shell.inp").write_text(text.replace("210000., 0.3\n*DENSITY", "210000., 0.3\n*EXPANSION").replace("7.85e-9", "1e-5"))
     scene = convert(tmp_path / "shell.inp", tmp_path / "lacks")
-    assert "# density =    # FILL IN [kg/m3]" in scene.read_text()
+    assert 'density = "FILL IN [kg/m3]: the deck has none"' in scene.read_text()
     assert "density" in squeal(scene, "--dry-run", ranks=1).messages[0]
 
 
@@ -283,7 +284,7 @@ def test_all_that_an_input_deck_may_name(tmp_path):
         "*ELEMENT, TYPE=SFM3D4, ELSET=Skin\n2, 5,6,7,8\n*ELEMENT, TYPE=SPRINGA, ELSET=wire\n3, 1, 2\n*NSET, NSET=Right, GENERATE\n"
         "2, 3, 1\n*NSET, NSET=Right\n6, 7\n*NSET, NSET=both\nRIGHT, 1\n*NSET, NSET=of_body, ELSET=BODY\n*NSET, NSET=ref\n99\n"
         "*SURFACE, NAME=side\nBody, S4\n*SURFACE, NAME=hull, TYPE=ELEMENT\nBODY\n*SURFACE, NAME=dots, TYPE=NODE\nRight\n"
-        "*MATERIAL, NAME=Steel\n*ELASTIC, TYPE=ENGINEERING CONSTANTS\n1,1,1\n*SOLID SECTION, ELSET=Body, MATERIAL=STEEL\n"
+        "*MATERIAL, NAME=Steel\n*ELASTIC, TYPE=LAMINA\n1,1,1\n*SOLID SECTION, ELSET=Body, MATERIAL=STEEL\n"
         "*TIE, NAME=t\nside, hull\n*CONTACT PAIR, INTERACTION=i\nSkin, side\n*BOUNDARY\n1, ZSYMM\nref, 1, 6\nRight, 2, 2, 0.1\n")
     model = TOOL.read_deck(tmp_path / "deck.inp")
     assert {name: {frozenset(f) for f in faces} for name, faces in model.surfaces.items() if name != "hull" and name != "of_body"} == {
@@ -291,10 +292,11 @@ def test_all_that_an_input_deck_may_name(tmp_path):
         "All": {frozenset(f) for f in model.faces(1)}}
     assert len(model.surfaces["hull"]) == len(model.surfaces["of_body"]) == 6
     assert model.node_sets == {"both": [2, 3, 6, 7, 1], "node_1": [1]}  # the others are the nodes of their surfaces
-    assert model.supports == [("node_1", ["z", "rx", "ry"]), ("Right", ["y"])]
+    assert model.supports == [("node_1", ["z", "rx", "ry"], {}), ("Right", ["y"], {"displacement": [0, 0.1, 0]})]
     text = convert(tmp_path / "deck.inp", tmp_path / "out").read_text()
-    for words in ('[[tie]]\nslave = "side"\nmaster = "hull"', "contact of Skin (slave) and side (master)", "1 elements of type SPRINGA", "the set ref",
-                  "prescribed motion 0.1 of Right", "*ELASTIC, TYPE=ENGINEERING CONSTANTS is not isotropic"):
+    for words in ('[[tie]]\nslave = "side"\nmaster = "hull"', "[[contact]]\nrotor = \"side\"\nstator = \"Skin\"\nfriction = 0\n",
+                  "1 elements of type SPRINGA", "the set ref", "fixed = \"y\"\ndisplacement = [0, 0.1, 0]",
+                  "*ELASTIC, TYPE=LAMINA", "young = \"FILL IN [Pa]: the deck has none\""):
         assert words in text, words
 
 
@@ -313,10 +315,10 @@ def test_all_that_bulk_data_may_name(tmp_path):
     surfaces = {name: {frozenset(face) for face in faces} for name, faces in model.surfaces.items()}
     assert surfaces == {"property_20": {TOP}, "set_4": {RIGHT}, "set_6": {TOP}, "spc_1_3": {frozenset((1, 2, 3, 4))}}
     assert model.element_sets == {"set_6_elements": [1]}
-    assert model.node_sets == {"spc_grid_12": [4], "spc_2_13": [10], "spc_2_2": [11]}
-    assert dict(model.supports) == {"spc_grid_12": ["x", "y"], "spc_1_3": ["z"], "spc_2_13": ["x", "z"], "spc_2_2": ["y"]}
+    assert model.node_sets == {"spc_grid_12": [4], "spc_2_13": [10], "spc_2_2": [11], "rbe2_50": [2]}
+    assert held(model) == {"spc_grid_12": ["x", "y"], "spc_1_3": ["z"], "spc_2_13": ["x", "z"], "spc_2_2": ["y"]}
     assert model.materials["7"] == {"young": 2.1e11, "poisson": 0.3, "density": 7850, "loss_factor": 0}
-    assert model.materials["8"]["poisson"] == pytest.approx(0.5, rel=1e-15) and "RBE2" in model.notes[0]
+    assert model.materials["8"]["poisson"] == pytest.approx(0.5, rel=1e-15)
 
 
 BULK = "".join(f"GRID,{i},,{x}.,{y}.,{z}.\n" for i, (x, y, z) in enumerate(CUBE, 1))
@@ -326,13 +328,13 @@ BULK += "CHEXA,1,10,1,2,3,4,5,6\n,7,8\nPSOLID,10,7\n"
 def test_the_case_control_selects_supports(tmp_path):
     spc = "SPC1,1,3,1,2\nSPC1,2,1,3\nSPC1,3,2,4\nSPCADD,9,1,3\n"
     model = read_text(tmp_path, "SUBCASE 1\n  spc = 9\nBEGIN BULK\n" + spc + BULK, "a.bdf")
-    assert model.supports == [("spc_1_3", ["z"]), ("spc_3_2", ["y"])]
+    assert held(model) == {"spc_1_3": ["z"], "spc_3_2": ["y"]}
     assert model.notes == ["SPC 2, which the case control does not select"]
     model = read_text(tmp_path, "BEGIN BULK\n" + spc + BULK, "a.bdf")
     assert len(model.supports) == 3
     assert model.notes == ["a choice of supports in the case control: all are there, SPC 1, 2, 3"]
     model = read_text(tmp_path, "SPC=1\nSUBCASE 2\nSPC=7\nBEGIN BULK\n" + spc + BULK, "a.bdf")
-    assert model.supports == [("spc_1_3", ["z"])]
+    assert held(model) == {"spc_1_3": ["z"]}
     assert "SPC 7, which the case control selects and the deck has not" in model.notes
 
 
@@ -340,12 +342,12 @@ def test_rotations_that_solids_have_not_are_not_held(tmp_path):
     """456 at nodes of solids, as preprocessors write, would be a support without motion and a surface of all faces."""
     text = "GRDSET,,,,,,,456\n" + BULK.replace("GRID,1,,0.,0.,0.", "GRID,1,,0.,0.,0.,,123")
     model = read_text(tmp_path, text, "a.bdf")
-    assert model.supports == [("spc_grid_123", ["x", "y", "z"])]
+    assert held(model) == {"spc_grid_123": ["x", "y", "z"]}
     assert model.node_sets == {"spc_grid_123": [1]} and model.surfaces == {}
     assert model.notes == ["the held rotations of 7 nodes that have none, as nodes of solids"]
     shell = "GRID,9,,2.,0.,0.\nGRID,10,,2.,1.,0.\nCQUAD4,2,20,2,9,10,3\nPSHELL,20,7,0.1,7\n"
     model = read_text(tmp_path, text + shell, "a.bdf")
-    assert dict(model.supports)["spc_grid_456"] == ["rx", "ry", "rz"]
+    assert held(model)["spc_grid_456"] == ["rx", "ry", "rz"]
     assert model.node_sets["spc_grid_456"] == [2, 3, 9, 10]
 
 
@@ -364,17 +366,16 @@ def test_what_bulk_data_has_and_the_mesh_has_not_is_named(tmp_path):
     text = BULK + ("PARAM,WTMASS,1.-3\nPARAM,G,0.02\nPARAM,POST,-1\nPARAM,W3,6000.\nMAT1,7,2.1+11,,.3,7850.,,,0.01\n"
                    "SPC,1,1,3,0.5\nGRID,9,,2.,0.,0.\nGRID,10,,2.,1.,0.\nCQUAD4,2,20,2,9,10,3,,0.1\n,,0,1.,1.\n"
                    "PSHELL,20,7,0.1,8,2.0,8,0.833333,0.4\n"
-                   "CQUAD4,3,30,5,6,7,8\nPSHELL,30,7,5.\nCONM2,4,1,,3.\nCONM2,5,2,,3.\n")
+                   "CQUAD4,3,30,5,6,7,8\nPSHELL,30,7,5.\nCGAP,4,1,1,3\nCGAP,5,2,2,3\n")
     model = read_text(tmp_path, text, "a.bdf")
     assert model.materials["7"]["density"] == pytest.approx(7.85, rel=1e-15)
     scene = convert(tmp_path / "a.bdf", tmp_path / "out").read_text()
     assert scene.count("\nloss_factor = 0.03\n") == 2
     notes = "\n".join(model.notes)
-    for words in ("the cards CONM2 (2)", "ZOFFS of 1 CQUAD4", "T1 to T4 of 1 CQUAD4", "PARAM W3",
-                  "thickness 5 of PSHELL 30, whose elements lie on solids", "MID2, 12I/T**3, NSM of PSHELL 20",
-                  "the enforced motion 0.5 of node 1"):
+    for words in ("the cards CGAP (2)", "ZOFFS of 1 CQUAD4", "T1 to T4 of 1 CQUAD4", "PARAM W3",
+                  "thickness 5 of PSHELL 30, whose elements lie on solids", "MID2, 12I/T**3, NSM of PSHELL 20"):
         assert words in notes, words
-    assert len(model.notes) == 7
+    assert len(model.notes) == 6 and 'fixed = "z"\ndisplacement = [0, 0, 0.5]' in scene
 
 
 def test_parts_of_one_name_are_two(tmp_path):
@@ -388,6 +389,12 @@ FLAT_CUBE = "*NODE\n" + "".join(f"{i}, {x}, {y}, {z}\n" for i, (x, y, z) in enum
 CUBE_ON_CUBE = FLAT_CUBE + (
     "9, 0,0,2\n10, 1,0,2\n11, 1,1,2\n12, 0,1,2\n*ELEMENT, TYPE=C3D8, ELSET=all\n1, 1,2,3,4,5,6,7,8\n"
     "2, 5,6,7,8,9,10,11,12\n")
+
+
+def held(model):
+    """Motions of supports by their groups, without axes and displacements."""
+    assert not any(keys for *_, keys in model.supports)
+    return {name: motions for name, motions, _ in model.supports}
 
 
 def read_text(tmp_path, text, name="deck.inp"):
@@ -430,7 +437,7 @@ def test_a_name_is_one_group(tmp_path, squeal):
         "*BOUNDARY\none, 1, 3\n*SOLID SECTION, ELSET=one, MATERIAL=m\n")
     model = read_text(tmp_path, text)
     assert list(model.parts) == ["one"] and model.ties == [("one_faces", "two")]
-    assert model.supports == [("one_nodes", ["x", "y", "z"])] and model.node_sets["one_nodes"] == [1, 2, 3, 4, 5]
+    assert held(model) == {"one_nodes": ["x", "y", "z"]} and model.node_sets["one_nodes"] == [1, 2, 3, 4, 5]
     # the same nodes under the same name are one group
     more = "*NSET, NSET=all, ELSET=all\n*NSET, NSET=low\n1,2,3,4\n*SURFACE, NAME=low\n1, S1\n"
     model = read_text(tmp_path, CUBE_ON_CUBE + more)
@@ -447,7 +454,7 @@ def test_numbers_outside_of_instances_are_others(tmp_path):
                    "*NSET, NSET=low, INSTANCE=i\n1,2,3,4\n*END ASSEMBLY\n*BOUNDARY\nrp, 1, 6\nlow, PINNED\n")
     model = read_text(tmp_path, text)
     assert [tuple(model.nodes[n]) for n in (1, 7)] == [(5, 0, 0), (6, 1, 1)] and tuple(model.nodes[13]) == (9, 9, 9)
-    assert model.supports == [("low", ["x", "y", "z"])] and "the set rp and its support" in model.notes[0]
+    assert held(model) == {"low": ["x", "y", "z"]} and "the set rp and its support" in model.notes[0]
 
 
 @pytest.mark.parametrize("data, at", [("", (0, 0, 0)), ("5.\n", (5, 0, 0)), (",,3.\n", (0, 0, 3)),
@@ -481,13 +488,13 @@ def test_what_an_input_deck_has_and_the_mesh_has_not_is_named(tmp_path):
         "*DAMPING, BETA=1e-7, STRUCTURAL=0.01\n*SOLID SECTION, ELSET=all, MATERIAL=m\n"
         "*SHELL SECTION, ELSET=skin, COMPOSITE, OFFSET=SPOS\n0.1, 3, m\n0.2, 3, m\n*TIE, NAME=t\nSIDE, TOP\n"
         "*CONTACT PAIR\nr, TOP\nside, TOP\n"
-        "*TIE, NAME=u\nrow, TOP\n*SURFACE, NAME=row, TYPE=NODE\n1\n2\n*TRANSFORM, NSET=n\n0,1,0,-1,0,0\n"
+        "*TIE, NAME=u\nrow, TOP\n*SURFACE, NAME=row, TYPE=NODE\n1\n2\n*SECTION PRINT, NAME=n\nSOF\n"
         "*BOUNDARY, OP=NEW\nskins, 4, 6\nn, ENCASTRE\nn, 11, 11, 20.\n*NSET, NSET=Skins\n5,6,7\n"
-        "*STEP\n*CLOAD\n1,1,1.\n*CLOAD\n1,2,1.\n*DSLOAD\nside, P, 1.\n*NODE FILE\nU\n*END STEP\n"))
+        "*STEP\n*STATIC\n*TEMPERATURE\n1,1.\n*TEMPERATURE\n2,1.\n*DSLOAD\nside, TRVEC, 1.\n*NODE FILE\nU\n*END STEP\n"))
     notes = "\n".join(model.notes)
     for words in ("2 elements of type B31", "OFFSET=SPOS of *SHELL SECTION (line 40)",
-                  "*TRANSFORM (line 53)", "OP=NEW of *BOUNDARY (line 55)",
-                  "*CLOAD (2 times, first in line 62)", "*DSLOAD (line 66)", "first line of *ELASTIC (line 35)",
+                  "*SECTION PRINT (line 53)", "OP=NEW of *BOUNDARY (line 55)",
+                  "*TEMPERATURE (2 times, first in line 63)", "*DSLOAD of type TRVEC on side (line 68)", "first line of *ELASTIC (line 35)",
                   "2 layers of *SHELL SECTION", "tie of row (slave) and Top (master): row has no faces",
                   "the surface r (line 32)", "degrees of freedom from 11 on of n",
                   "support of Skins along rx ry rz: its nodes have no rotations",
@@ -495,10 +502,10 @@ def test_what_an_input_deck_has_and_the_mesh_has_not_is_named(tmp_path):
                   "1 nodes of the set n", "1 elements of the set mixed that are not there, 77 the first", "the set rod, whose elements"):
         assert words in notes, words
     assert len(model.notes) == 17
-    assert model.ties == model.contacts == [("side", "Top")] and model.supports == [("n", list(MOTIONS))]
+    assert model.ties == [("side", "Top")] and model.contacts == [("side", "Top", {"friction": 0})] and held(model) == {"n": list(MOTIONS)}
     assert model.parts["skin"].thickness == pytest.approx(0.3, rel=1e-15) and model.parts["skin"].material == "M"
     scene = convert(tmp_path / "deck.inp", tmp_path / "out").read_text()
-    assert "loss_factor = 0.01\nbeta = 1e-07\n" in scene and "# loss_frequency =    # FILL IN" in scene
+    assert "loss_factor = 0.01\nbeta = 1e-07\n" in scene and "loss_frequency = \"FILL IN [Hz]" in scene
 
 
 BAD = {
@@ -516,9 +523,10 @@ BAD = {
     "a node below 1": ("*NODE\n0,0,0,0\n", ["line 2", "node 0", "from 1"]),
     "no number": ("*NODE\n1,0,nan,0\n", ["line 2", "'nan'"]),
     "an element twice": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=S3\n1,1,1,1\n1,1,1,1\n", ["line 5", "line 4", "twice"]),
-    "nodes in a system": ("*SYSTEM\n1,0,0\n*NODE\n1,0,0,0\n", ["line 1", "*SYSTEM", "global coordinates"]),
-    "nodes made": ("*NODE\n1,0,0,0\n*NGEN\n1,5\n", ["line 3", "*NGEN", "preprocessor"]),
-    "elements made": ("*NODE\n1,0,0,0\n*ELGEN, ELSET=e\n1,5\n", ["line 3", "*ELGEN", "preprocessor"]),
+    "a system of a line": ("*SYSTEM\n1,0,0,2,0,0\n3,0,0\n*NODE\n1,0,0,0\n", ["line 3", "*SYSTEM", "on a line"]),
+    "nodes made of none": ("*NODE\n1,0,0,0\n*NGEN\n1,5\n", ["line 4", "node 5", "not defined"]),
+    "nodes mapped": ("*NODE\n1,0,0,0\n*NMAP\n1,5\n", ["line 3", "*NMAP", "preprocessor"]),
+    "elements made of none": ("*NODE\n1,0,0,0\n*ELGEN, ELSET=e\n1,5\n", ["line 4", "element 1", "not defined"]),
     "an end within a keyword": ("*NODE\n1,0,0,0\n*NSET,\n", ["*NSET", "comma"]),
     "a surface of nothing": ("*NODE\n1,0,0,0\n*SURFACE, NAME=s\n,\n", ["line 4", "0 fields", "a face"]),
     "a support of nothing": ("*NODE\n1,0,0,0\n*BOUNDARY\n,\n", ["line 4", "0 fields", "ENCASTRE"]),
@@ -531,9 +539,9 @@ BAD = {
     "an instance twice": ("*PART, NAME=a\n*END PART\n*INSTANCE, NAME=b, PART=a\n*END INSTANCE\n"
                           "*INSTANCE, NAME=B, PART=a\n",
                           ["line 5", "'B'", "line 3"]),
-    "a support in a turned system": (FLAT_CUBE + "*NSET, NSET=n\n1\n*TRANSFORM, NSET=n\n0,1,0,-1,0,0\n"
-                                     "*BOUNDARY\nn, 1\n",
-                                     ["line 15", "node 1", "line 12", "all translations"]),
+    "a support in two systems": (FLAT_CUBE + "*NSET, NSET=n\n1\n*NSET, NSET=m\n1,2\n*TRANSFORM, NSET=n\n0,1,0,-1,0,0\n"
+                                 "*BOUNDARY\nm, 1\n",
+                                 ["line 17", "x of m", "line 14", "set of its own"]),
     "a file that is not there": ("*HEADING\nx\n*INCLUDE, INPUT=gone.inc\n", ["two.inp, line 3", "includes gone.inc"]),
     "nothing": ("*HEADING\nx\n", ["two.inp", "*NODE"]),
     "a face that is not there": ("*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT, TYPE=C3D4, ELSET=e\n9,1,2,3,4\n*SURFACE, NAME=s\ne, S5\n",
@@ -545,7 +553,7 @@ BAD_BULK = {
     "a file that is not there": ("GRID,1\nINCLUDE 'gone.bdf'\n", ["two.bdf, line 2", "gone.bdf"]),
     "points on a line": ("CORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,0.,2.\nGRID,1,7,0.,0.,0.\n", ["line 1", "on a line"]),
     "a system in itself": ("CORD2R,7,7,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\nGRID,1,7,0.,0.,0.\n", ["line 1", "in itself"]),
-    "a support in a turned system": ("CORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,1.,0.\nGRID,1,,0.,0.,0.,7,1\n", ["line 3", "turned system"]),
+    "an element without a kernel": ("GRID,1\nCPYRAM,7,1,1,1,1,1,1\n", ["line 2", "CPYRAM 7", "no element in squeal"]),
     "a word for a number": ("GRID,1,,x,0.,0.\n", ["line 1", "GRID, field 4", "'x'"]),
     "a node at two places": ("GRID,1\nGRID,1,,1.,0.,0.\n", ["line 2", "node 1", "line 1", "one position"]),
     "a material twice": ("GRID,1\nMAT1,1,1.,,.3\nMAT1,1,2.,,.3\n", ["line 3", "MAT1 1", "line 2", "keep one"]),

@@ -41,8 +41,9 @@ constexpr int pieces = 40; // of a period, for means and spectra
 struct Motion
 {
   SmoothModel model;
-  Flow piece;                  // over a part of a period
-  double period;               // [s]
+  Flow piece;    // over a part of a period
+  double period; // [s] of a window
+  MotionSeries seen{};
   Owned<Vec> from;             // of the period recorded last
   std::vector<double> weights; // of the displacements in the coordinate
 
@@ -69,23 +70,24 @@ struct Motion
     check(VecScale(state, 1 / (2 * step)));
   }
 
-  PeriodSample sample(Vec state)
+  double advance(Vec state)
   {
     from = copy_of(state);
-    PeriodSample seen{{0}, {}, {}};
     const Owned<Vec> next = zeros_like(from);
+    double energy = 0;
     for (int i = 0; i < pieces; ++i)
     {
       piece.integrate(period / pieces, state, next, nullptr);
       check(VecCopy(next, state));
       const double norm = energy_norm(model.flow, state);
-      seen.means[0] += norm * norm / 2 / pieces;
+      seen.averaged[0].push_back(norm * norm / 2);
+      energy += seen.averaged[0].back() / pieces;
       const std::vector<double> u = all_entries(displacement(state));
       double value = 0;
       for (std::size_t k = 0; k < u.size(); ++k) value += weights[k] * u[k];
-      seen.coordinate.push_back(value);
+      seen.moving[0].push_back(value);
     }
-    return seen;
+    return energy;
   }
 
   ExaminedMotion examine(const std::vector<double>& u, int before, int periods)
@@ -100,8 +102,9 @@ struct Motion
     SettledOptions options;
     options.periods = periods;
     options.exponents = std::min<PetscInt>(4, 2 * static_cast<PetscInt>(u.size()));
-    return examine_motion(
-        model.flow, [this](Vec now) { return sample(now); }, state, period, options);
+    seen = {{{}}, {{}}, {}};
+    return examine_motion(model.flow, {period, [this](Vec now) { return advance(now); }, [this] { return seen; }},
+                          state, options);
   }
 };
 

@@ -15,7 +15,7 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "openmpi-bin, libopenblas0-pthread, python3 (>= 3.11), python3-h5py, python3-matplotlib, \
 python3-numpy, python3-pandas, python3-pil, python3-scipy")
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS python3-meshio)
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "libjs-chart.js, libjs-three, python3-meshio")
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "gmsh, paraview, python3-xarray")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "finite elements for brake squeal")
 set(CPACK_DEBIAN_PACKAGE_DESCRIPTION

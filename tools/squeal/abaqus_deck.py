@@ -1,25 +1,34 @@
-"""Meshes of Abaqus and CalculiX: an input deck to a mesh_model.Model."""
+"""Decks of Abaqus and CalculiX to a mesh_model.Model: nodes, elements, sets, surfaces and supports; other keywords by the
+handlers of their modules."""
 
 import re
 
+import numpy as np
+
+from squeal import abaqus_joining
+from squeal import abaqus_steps
+from squeal.abaqus_nodes import abaqus_nodes, made_explicit
 from squeal.abaqus_parts import flattened
-from squeal.deck_files import Problem, abaqus_nodes, blocks_of, number, whole
-from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part
+from squeal.abaqus_properties import frame_of, read_materials, read_sections
+from squeal.deck_files import Problem, blocks_of, number, whole
+from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model
 
 SOLIDS = {"4": "tet4", "6": "wedge6", "8": "hex8", "10": "tet10", "20": "hex20"}
 SHELLS = {"3": "tri3", "4": "quad4"}
 SKINS = {"3": "tri3", "4": "quad4", "6": "tri6", "8": "quad8"}
 NAMED_SUPPORTS = {"ENCASTRE": "x y z rx ry rz", "PINNED": "x y z", "XSYMM": "x ry rz", "YSYMM": "y rx rz", "ZSYMM": "z rx ry",
                   "XASYMM": "y z rx", "YASYMM": "x z ry", "ZASYMM": "x y rz"}
-OPTIONS = {"NODE": "NSET SYSTEM INPUT", "ELEMENT": "TYPE ELSET INPUT", "SURFACE": "NAME TYPE INTERNAL INPUT",
-           "BOUNDARY": "INPUT", "ELASTIC": "TYPE", "DENSITY": "", "DAMPING": "ALPHA BETA STRUCTURAL",
-           "TIE": "NAME ADJUST", "SOLID SECTION": "ELSET MATERIAL ORIENTATION CONTROLS",
-           "SHELL SECTION": "ELSET MATERIAL ORIENTATION CONTROLS COMPOSITE"}  # what is read of keywords
-READ = {*OPTIONS, "ELSET", "NSET", "MATERIAL", "CONTACT PAIR", "SYSTEM"}
-SILENT = set("HEADING,PREPRINT,STEP,END STEP,OUTPUT,NODE OUTPUT,ELEMENT OUTPUT,CONTACT OUTPUT,ENERGY OUTPUT,"
-             "MODAL OUTPUT,NODE FILE,EL FILE,CONTACT FILE,NODE PRINT,EL PRINT,CONTACT PRINT,RESTART,FILE FORMAT,"
-             "PRINT".split(","))  # these ask for results
-MADE = ("ELGEN", "ELCOPY")
+# what is read of keywords beside their data
+OPTIONS = {"NODE": "NSET,SYSTEM,INPUT", "ELEMENT": "TYPE,ELSET,INPUT", "SURFACE": "NAME,TYPE,INTERNAL,INPUT,COMBINE",
+           "BOUNDARY": "INPUT,FIXED", "ELASTIC": "TYPE", "DENSITY": "", "DAMPING": "ALPHA,BETA,STRUCTURAL",
+           "SOLID SECTION": "ELSET,MATERIAL,ORIENTATION,CONTROLS", "TRANSFORM": "NSET,TYPE",
+           "SHELL SECTION": "ELSET,MATERIAL,CONTROLS,COMPOSITE", **abaqus_joining.OPTIONS, **abaqus_steps.OPTIONS}
+# in the order of the deck, once mesh, sets and sections are there
+HANDLERS = {**abaqus_joining.HANDLERS, **abaqus_steps.HANDLERS}
+READ = {*OPTIONS, *HANDLERS, "ELSET", "NSET", "MATERIAL", "ORIENTATION"}
+SILENT = set("HEADING,PREPRINT,OUTPUT,NODE OUTPUT,ELEMENT OUTPUT,CONTACT OUTPUT,ENERGY OUTPUT,MODAL OUTPUT,NODE FILE,"
+             "EL FILE,CONTACT FILE,NODE PRINT,EL PRINT,CONTACT PRINT,RESTART,FILE FORMAT,PRINT".split(","))  # ask for results
+LINES = ("SPRING", "DASHPOT", "MASS", "ROTARYI", *abaqus_joining.BEAMS)  # elements that keywords of their sections read
 
 
 def kind_of(name, place):
@@ -32,7 +41,7 @@ def kind_of(name, place):
         if shell[1] not in SHELLS:
             raise Problem(f"{place}: elements {name}: expected shells with 3 or 4 nodes")
         return SHELLS[shell[1]]
-    if skin := re.match(r"SFM3D(\d)", name):
+    if skin := re.match(r"(?:SFM3D|CPS|CPE)(\d)", name):
         return SKINS.get(skin[1])
     return None
 
@@ -60,22 +69,44 @@ class Elements:
         self.sets = Sets()
         self.unnamed = Sets()  # elements without ELSET, by type
         self.left_out = {}  # number: type
+        self.lines = {}  # number: (type, nodes) of springs, masses and beams
         self.shells = set()  # those that are no skins
 
 
+class Deck:
+    """What the handlers of keywords share."""
+
+    def __init__(self, file, blocks):
+        self.model, self.blocks = Model(file), blocks
+        self.nodes, self.elements, self.steps = Sets(), Elements(), abaqus_steps.Steps()
+        self.coupling = None  # node, surface and block of the last *COUPLING
+        self.pretension, self.tension, self.beams = {}, {}, {}  # by node, by node, by element
+        self.used = set()  # nodes of elements
+
+    def line_of(self, place):
+        file, _, line = place.rpartition(", ")
+        return line if file == str(self.model.source) else place
+
+    def note(self, what, place):
+        self.model.notes.append(f"{what} ({self.line_of(place)})")
+
+    def nodes_of(self, text, place):
+        return [int(text)] if text.isdecimal() else self.nodes.get(text, place, "the node set")
+
+    def elements_of(self, text, place):
+        return [int(text)] if text.isdecimal() else self.elements.sets.get(text, place, "the element set")
+
+
 def read_inp(file):
-    blocks = flattened(blocks_of(file))
-    model = Model(file)
+    deck = Deck(file, made_explicit(flattened(blocks_of(file))))
+    model, blocks, nodes, elements = deck.model, deck.blocks, deck.nodes, deck.elements
     labels, positions = abaqus_nodes(blocks)
     model.nodes = dict(zip(labels.tolist(), positions))
     if not model.nodes:
         raise Problem(f"{file}: no *NODE")
-    nodes, elements = Sets(), Elements()
     for block in blocks:
-        if block.name in MADE:
-            raise Problem(f"{block.place}: *{block.name} makes elements: let the preprocessor write all of them")
         if block.name == "NODE" and "NSET" in block.options:
-            nodes.extend(block.options["NSET"], (whole(fields[0], place) for place, fields in block.rows()))
+            nodes.extend(block.options["NSET"], first_numbers(block))
         elif block.name == "ELEMENT":
             read_elements(block, model, elements)
     for block in blocks:
@@ -83,44 +114,55 @@ def read_inp(file):
             read_set(block, "ELSET", elements.sets)
         elif block.name == "NSET":
             read_set(block, "NSET", nodes, elements.sets, model)
-    note_what_is_left_out(blocks, model, elements)
-    read_materials(blocks, model)
-    read_sections(blocks, model, elements)
+    deck.used = {node for _, of in model.elements.values() for node in of}
+    read_materials(deck)
+    read_sections(deck)
     model.node_sets = {nodes.names[name]: list(dict.fromkeys(items)) for name, items in nodes.items.items()}
-    read_surfaces(blocks, model, elements, nodes)
-    read_boundaries(blocks, model, nodes)
+    read_surfaces(deck)
     name_element_sets(model, elements)
-    read_pairs(blocks, model)
+    for block in blocks:
+        if block.name in HANDLERS:
+            HANDLERS[block.name](block, deck)
+    abaqus_steps.finish(deck)
+    read_boundaries(deck)
+    name_nodes(model)
+    note_sets(model, elements)
+    note_what_is_left_out(deck)
     return model
 
 
-def line_of(place, model):
-    file, _, line = place.rpartition(", ")
-    return line if file == str(model.source) else place
+def name_nodes(model):
+    """Reference nodes have the name of a set that has no other node."""
+    for name, items in model.node_sets.items():
+        if len(items) == 1:
+            model.joints.names.setdefault(items[0], name)
 
 
-def note_what_is_left_out(blocks, model, elements):
-    types = list(elements.left_out.values())
+def note_what_is_left_out(deck):
+    model = deck.model
+    types = list(deck.elements.left_out.values())
     model.notes += [f"{types.count(name)} elements of type {name}" for name in dict.fromkeys(types)]
     found = {}
-    for block in blocks:
+    for block in deck.blocks:
         if block.name not in READ | SILENT:
             found.setdefault(f"*{block.name}", []).append(block.place)
         for key, value in block.options.items() if block.name in OPTIONS else ():
-            if key not in OPTIONS[block.name].split() and f"{key}={value}".upper() not in ("OFFSET=SMID", "OP=MOD"):
+            if key not in OPTIONS[block.name].split(",") and f"{key}={value}".upper() not in ("OFFSET=SMID", "OP=MOD"):
                 found.setdefault(f"{key}{'=' if value else ''}{value} of *{block.name}", []).append(block.place)
     for what, places in found.items():
         times = f"{len(places)} times, first in " if len(places) > 1 else ""
-        model.notes.append(f"{what} ({times}{line_of(places[0], model)})")
+        model.notes.append(f"{what} ({times}{deck.line_of(places[0])})")
 
 
 def read_elements(block, model, elements):
     name = block.options.get("TYPE", "").upper()
     kind = kind_of(name, block.place)
     numbers = read_known(block, model, name, kind) if kind else first_numbers(block)
+    if name.startswith(LINES):
+        elements.lines.update((of[0], (name, of[1:])) for of in short_lines(block))
     if kind is None:
         elements.left_out.update((n, name) for n in numbers)
-    elif not name.startswith("SFM"):
+    elif not name.startswith(("SFM", "CP")):
         elements.shells.update(numbers)
     if "ELSET" in block.options:
         elements.sets.extend(block.options["ELSET"], numbers)
@@ -130,6 +172,9 @@ def read_elements(block, model, elements):
 
 def read_known(block, model, name, kind):
     numbers, fields, size = [], [], 1 + (KINDS.get(kind) or FLAT[kind])[2]
+    table = block.table(size, np.int64)
+    if table is not None and model.add_elements(block, kind, table, "abaqus"):
+        return table[:, 0].tolist()
     for place, more in block.rows():
         fields += more
         if len(fields) < size:
@@ -146,13 +191,19 @@ def read_known(block, model, name, kind):
 
 
 def first_numbers(block):
-    """Numbers of elements whose number of nodes is not known here: a line that ends in a comma goes on."""
+    """Numbers at the beginning of lines; a line of elements that ends in a comma goes on."""
     numbers, goes_on = [], False
-    for place, line in block.lines:
+    for i, line in enumerate(block.texts):
         if not goes_on:
-            numbers.append(whole(line.split(",")[0], place))
-        goes_on = line.endswith(",")
+            word = line.partition(",")[0].strip()
+            numbers.append(int(word) if word.isdecimal() else whole(word, block.place_at(i)))
+        goes_on = block.name == "ELEMENT" and line.endswith(",")
     return numbers
+
+
+def short_lines(block):
+    """Number and nodes of elements that have a line each."""
+    return [[whole(field, place) for field in fields if field] for place, fields in block.rows(2, "an element's number and its nodes")]
 
 
 def read_set(block, key, sets, element_sets=None, model=None):
@@ -178,89 +229,16 @@ def read_set(block, key, sets, element_sets=None, model=None):
     sets.extend(name, found)
 
 
-def read_materials(blocks, model):
-    current = None
-    for block in blocks:
-        if block.name == "MATERIAL":
-            current = model.materials.setdefault(block.options.get("NAME", "").upper(), {})
-        elif block.name in ("ELASTIC", "DENSITY", "DAMPING"):
-            line = line_of(block.place, model)
-            if current is None:
-                raise Problem(f"{block.place}: *{block.name} before any *MATERIAL; expected it below one")
-            if block.name == "DAMPING":
-                keys = (("ALPHA", "alpha"), ("BETA", "beta"), ("STRUCTURAL", "loss_factor"))
-                current.update((key, number(block.options[of], block.place)) for of, key in keys if of in block.options)
-                continue
-            kind = block.options.get("TYPE", "ISOTROPIC").upper()
-            if not kind.startswith("ISO"):
-                model.notes.append(f"*ELASTIC, TYPE={kind} is not isotropic ({line})")
-                continue
-            expected = (2, "Young's modulus and Poisson's ratio") if block.name == "ELASTIC" else (1, "a density")
-            rows = list(block.rows(*expected))
-            if len(rows) > 1:
-                model.notes.append(f"all but the first line of *{block.name} ({line}), as of other temperatures")
-            for place, fields in rows[:1]:
-                if block.name == "DENSITY":
-                    current["density"] = number(fields[0], place)
-                else:
-                    current.update(young=number(fields[0], place), poisson=number(fields[1], place))
-
-
-def read_sections(blocks, model, elements):
-    """A part for every section; a later section takes its elements from earlier ones. Solids without one are parts by
-    their sets."""
-    owner = {}
-    for block in blocks:
-        if block.name not in ("SOLID SECTION", "SHELL SECTION"):
-            continue
-        name = block.options.get("ELSET", "")
-        numbers = elements.sets.get(name, block.place, "the element set")
-        part = Part([], block.options.get("MATERIAL", "").upper())
-        if block.name == "SHELL SECTION":
-            read_thickness(block, part, model)
-        shown = elements.sets.names[name.upper()]
-        kinds = FLAT if block.name == "SHELL SECTION" else KINDS
-        fit = [n for n in numbers if n in model.elements and model.elements[n][0] in kinds]
-        others = sum(n in model.elements for n in numbers) - len(fit)
-        if others:
-            line = line_of(block.place, model)
-            model.notes.append(f"*{block.name} ({line}) of {others} elements of another kind in {shown}")
-        if fit:
-            model.parts[shown] = part
-            owner.update((n, shown) for n in fit)
-    for n, name in owner.items():
-        model.parts[name].elements.append(n)
-    model.parts = {name: part for name, part in model.parts.items() if part.elements}
-    for sets in (elements.sets, elements.unnamed):
-        for key, numbers in sets.items.items():
-            free = [n for n in numbers if n in model.elements and n not in owner and model.elements[n][0] in KINDS]
-            if free and sets.names[key] not in model.parts:
-                model.parts[sets.names[key]] = Part(free)
-                owner.update((n, sets.names[key]) for n in free)
-
-
-def read_thickness(block, part, model):
-    """The thickness in the first line; of layers, each with a line, the sum, and their material where it is one."""
-    rows = [(place, fields) for place, fields in block.rows() if fields and fields[0]]
-    if "COMPOSITE" not in block.options:
-        part.thickness = number(rows[0][1][0], rows[0][0]) if rows else 0.0
-        return
-    part.thickness = sum(number(fields[0], place) for place, fields in rows)
-    materials = {fields[2].upper() if len(fields) > 2 else "" for _, fields in rows}
-    part.material = materials.pop() if len(materials) == 1 else None
-    model.notes.append(f"the {len(rows)} layers of *SHELL SECTION ({line_of(block.place, model)}): the part has their "
-                       "thickness together" + ("" if part.material else " and no material"))
-
-
-def read_surfaces(blocks, model, elements, nodes):
-    for block in blocks:
+def read_surfaces(deck):
+    model, elements, nodes = deck.model, deck.elements, deck.nodes
+    for block in deck.blocks:
         if block.name != "SURFACE":
             continue
         name, kind = block.options.get("NAME", ""), block.options.get("TYPE", "ELEMENT").upper()
         if not name or name in model.surfaces:
             raise Problem(f"{block.place}: the surface '{name}': expected NAME=NAME, which no other surface has")
         rows = list(block.rows(1, "an element, a node or a set, and a face"))
-        line = line_of(block.place, model)
+        line = deck.line_of(block.place)
         sides = {fields[1].upper() for _, fields in rows if len(fields) > 1}
         if kind not in ("ELEMENT", "NODE") or "COMBINE" in block.options or any(re.match("E", side) for side in sides):
             model.notes.append(f"the surface {name} ({line}): of no faces of elements")
@@ -303,11 +281,13 @@ def faces_of(model, numbers, side, place, left_out):
     return faces
 
 
-def read_boundaries(blocks, model, nodes):
-    """Supports by set and motions; a single node gets a set of its own."""
-    held, turned = {}, turned_nodes(blocks, nodes)
-    for block in blocks:
-        if block.name != "BOUNDARY":
+def read_boundaries(deck):
+    """Supports by set and motions; a single node gets a set of its own. Nodes that no element has are held as
+    reference points."""
+    model, nodes, turned = deck.model, deck.nodes, turned_nodes(deck)
+    held, moved, frames = {}, {}, {}
+    for block in deck.blocks:
+        if block.name != "BOUNDARY" or "FIXED" in block.options:
             continue
         for place, fields in block.rows(2, "a node or a set, and a motion from 1 to 6 or a word such as ENCASTRE"):
             name = fields[0]
@@ -317,40 +297,62 @@ def read_boundaries(blocks, model, nodes):
             else:
                 numbers = nodes.get(name, place, "the node set")
                 name = nodes.names[name.upper()]
-            motions = motions_of(fields, place, name, model)
-            oblique = [n for n in numbers if n in turned]
-            if oblique and motions and not ({"x", "y", "z"} <= motions and len(motions) in (3, 6)):
-                raise Problem(f"{place}: {' '.join(sorted(motions))} of node {oblique[0]} in the turned system of "
-                              f"{turned[oblique[0]]}: expected all translations, or motions along the global axes")
+            motions, value = motions_of(fields, place, name, deck)
+            for n in numbers:
+                if n not in deck.used and n in model.nodes:
+                    model.joints.held.setdefault(n, set()).update(motions)
+                    if value:
+                        model.joints.moved.setdefault(n, {}).update(dict.fromkeys(motions, value))
+            systems = {turned[n][0] for n in numbers if n in turned}
+            if systems and not ({"x", "y", "z"} <= motions and len(motions) in (3, 6) and not value):
+                if len(systems) > 1 or any(n not in turned for n in numbers):
+                    raise Problem(f"{place}: {' '.join(sorted(motions))} of {name}, whose nodes are in several systems of "
+                                  f"*TRANSFORM, one of {systems.pop()}: give each system a set of its own")
+                frames[name] = next(turned[n][1] for n in numbers)
             if motions:
                 held.setdefault(name, set()).update(motions)
-    model.supports = [(name, [m for m in MOTIONS if m in motions]) for name, motions in held.items()]
+            if value:
+                moved.setdefault(name, {}).update(dict.fromkeys(motions, value))
+    model.supports = [(name, [m for m in MOTIONS if m in motions], {**frames.get(name, {}), **displacements(moved.get(name))})
+                      for name, motions in held.items()]
 
 
-def turned_nodes(blocks, nodes):
-    """Places of *TRANSFORM by the nodes whose motions it turns."""
+def displacements(moved):
+    """Keys of a support for displacements by motion."""
+    if not moved:
+        return {}
+    keys = {"displacement": [moved.get(m, 0.0) for m in MOTIONS[:3]], "rotation": [moved.get(m, 0.0) for m in MOTIONS[3:]]}
+    return {key: values for key, values in keys.items() if any(values)}
+
+
+def turned_nodes(deck):
+    """Place and frame of *TRANSFORM by the nodes whose motions it turns."""
     found = {}
-    for block in blocks:
+    for block in deck.blocks:
         if block.name == "TRANSFORM":
-            of = nodes.get(block.options.get("NSET", ""), block.place, "the node set")
-            found.update(dict.fromkeys(of, block.place))
+            of, kind = deck.nodes.get(block.options.get("NSET", ""), block.place, "the node set"), block.options.get("TYPE", "R").upper()
+            rows = list(block.rows(6, "two points of a system"))
+            if kind not in ("R", "C") or not rows:
+                raise Problem(f"{block.place}: *TRANSFORM, TYPE={kind}: expected R or C and two points")
+            values = [number(field or "0", rows[0][0]) for field in rows[0][1][:6]]
+            found.update(dict.fromkeys(of, (block.place, frame_of(kind, values, rows[0][0]))))
     return found
 
 
-def motions_of(fields, place, name, model):
-    """Motions that a line of *BOUNDARY holds; those beyond 6, such as temperatures, are no motions."""
+def motions_of(fields, place, name, deck):
+    """Motions that a line of *BOUNDARY holds, and their displacement; those beyond 6, such as temperatures, are no
+    motions."""
     word = fields[1].upper()
     if word in NAMED_SUPPORTS:
-        return set(NAMED_SUPPORTS[word].split())
+        return set(NAMED_SUPPORTS[word].split()), 0.0
     first = whole(word, place, "a motion from 1 to 6, or a word such as ENCASTRE")
     last = whole(fields[2], place) if len(fields) > 2 and fields[2] else first
     if not 1 <= first <= last:
         raise Problem(f"{place}: motions {first} to {last}; expected 1 to 6")
     if last > 6:
-        model.notes.append(f"the degrees of freedom from {max(first, 7)} on of {name} ({line_of(place, model)})")
-    if first <= 6 and len(fields) > 3 and number(fields[3] or "0", place) != 0:
-        model.notes.append(f"the prescribed motion {fields[3]} of {name} ({line_of(place, model)}): it is held at zero")
-    return {MOTIONS[i - 1] for i in range(first, min(last, 6) + 1)}
+        deck.model.notes.append(f"the degrees of freedom from {max(first, 7)} on of {name} ({deck.line_of(place)})")
+    value = number(fields[3] or "0", place) if first <= 6 and len(fields) > 3 else 0.0
+    return {MOTIONS[i - 1] for i in range(first, min(last, 6) + 1)}, value
 
 
 def name_element_sets(model, elements):
@@ -365,11 +367,6 @@ def name_element_sets(model, elements):
             model.element_sets[name] = solids
         if flat and not (part and model.elements[part[0]][0] in FLAT):
             add_surface(model, name, flat)
-        unknown = [n for n in numbers if n not in model.elements and n not in elements.left_out]
-        if unknown and len(unknown) < len(numbers):
-            model.notes.append(f"{len(unknown)} elements of the set {name} that are not there, {unknown[0]} the first")
-        if numbers and not solids and not flat:
-            model.notes.append(f"the set {name}, whose elements are left out or not there")
     owned = {n for part in model.parts.values() for n in part.elements}
     for key, numbers in elements.unnamed.items.items():
         flat = [n for n in numbers if n in model.elements and model.elements[n][0] in FLAT and n not in owned]
@@ -380,6 +377,17 @@ def name_element_sets(model, elements):
         model.notes.append(f"stiffness and mass of {len(bare)} shells without a *SHELL SECTION: they are surfaces")
 
 
+def note_sets(model, elements):
+    """Sets whose elements are not there, once what is read of others is known."""
+    for key, numbers in elements.sets.items.items():
+        name = elements.sets.names[key]
+        unknown = [n for n in numbers if n not in model.elements and n not in elements.left_out and n not in elements.lines]
+        if unknown and len(unknown) < len(numbers):
+            model.notes.append(f"{len(unknown)} elements of the set {name} that are not there, {unknown[0]} the first")
+        if numbers and not any(n in model.elements or (n in elements.lines and n not in elements.left_out) for n in numbers):
+            model.notes.append(f"the set {name}, whose elements are left out or not there")
+
+
 def add_surface(model, name, flat):
     faces = [model.elements[n][1] for n in flat]
     if {frozenset(face) for face in model.surfaces.get(name, faces)} != {frozenset(face) for face in faces}:
@@ -387,17 +395,3 @@ def add_surface(model, name, flat):
         model.notes.append(f"the name {name} of a set of flat elements, which a surface has: it is {shown}")
         name = shown
     model.surfaces[name] = faces
-
-
-def read_pairs(blocks, model):
-    known = {name.upper(): name for name in [*model.node_sets, *model.surfaces]}
-    for block in blocks:
-        if block.name in ("TIE", "CONTACT PAIR"):
-            for place, fields in block.rows(1, "the slave surface and the master surface"):
-                missing = [name for name in fields[:2] if name.upper() not in known]
-                if missing or len(fields) < 2:
-                    what = f"whose surface {missing[0]} is not there" if missing else "which has one surface"
-                    model.notes.append(f"*{block.name} ({line_of(place, model)}), {what}")
-                else:
-                    pairs = model.ties if block.name == "TIE" else model.contacts
-                    pairs.append(tuple(known[name.upper()] for name in fields[:2]))

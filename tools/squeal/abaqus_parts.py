@@ -1,9 +1,13 @@
 """Decks of Abaqus with parts and assemblies, made flat: every instance gets numbers of its own and its place."""
 
 import numpy as np
-from squeal.deck_files import Block, Problem, number, whole
+from squeal.abaqus_nodes import made_explicit
+from squeal.deck_files import Problem, number, whole
 
 NUMBERED = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "BOUNDARY"}  # whose data lines hold numbers of nodes or elements
+FIRST = {"NODE", "SURFACE", "BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "MOTION", "KINEMATIC COUPLING"}  # in the first field alone
+PAIRS = {"TIE", "CONTACT PAIR", "MPC"}  # whose data lines hold names
+REFERRING = ("NSET", "ELSET", "NAME", "REF NODE", "SURFACE", "NODE", "TIE NSET", "PIN NSET", "ELEMENT")  # options with names
 NAMING = {"NSET": "NSET", "ELSET": "ELSET", "SURFACE": "NAME"}  # options that name what a block defines
 SETS = ("NSET", "ELSET")  # options that define a set in *NODE and *ELEMENT, and that other keywords refer to
 
@@ -25,7 +29,7 @@ class Scope:
         start, end, angle = np.array(self.turn[:3]), np.array(self.turn[3:6]), np.radians(self.turn[6])
         axis = (end - start) / np.linalg.norm(end - start)
         arm = position - start
-        return start + np.cos(angle) * arm + np.sin(angle) * np.cross(axis, arm) + (1 - np.cos(angle)) * axis * (axis @ arm)
+        return start + np.cos(angle) * arm + np.sin(angle) * np.cross(axis, arm) + (1 - np.cos(angle)) * np.multiply.outer(arm @ axis, axis)
 
 
 def instance_of(block):
@@ -54,6 +58,8 @@ def flattened(blocks):
     if not any(block.name in ("PART", "INSTANCE") for block in blocks):
         return blocks
     instances, outside = divided(blocks)
+    for scope in (*instances, outside):
+        scope.blocks = made_explicit(scope.blocks)
     number_scopes([*instances, outside])
     name_sets(instances, outside)
     return [relabelled(block, scope, instances) for scope in [*instances, outside] for block in scope.blocks]
@@ -130,12 +136,12 @@ def relabelled(block, scope, instances):
     defines = scope not in instances
     if defines and "INSTANCE" in block.options:
         scope = find_instance(block.options["INSTANCE"], block.place, instances)
-    copy = Block(block.place, block.name, dict(block.options))
-    for key in ("NSET", "ELSET", "NAME"):
+    copy = block.with_lines([])
+    for key in REFERRING:
         own = key == NAMING.get(block.name)
         if key in copy.options and (key != "NAME" or own) and not (defines and own):
             copy.options[key] = flat_text(copy.options[key], scope, instances)
-    copy.lines = [(place, flat_line(block, place, line, scope, instances)) for place, line in block.lines]
+    copy.texts = flat_texts(block, scope, instances)
     return copy
 
 
@@ -156,17 +162,33 @@ def flat_text(text, scope, instances):
     return scope.flat_names.get(text.upper(), text)
 
 
-def flat_line(block, place, line, scope, instances):
+def flat_texts(block, scope, instances):
+    """The lines of a block; nodes of plain numbers at once."""
+    table = block.table(4, float) if block.name == "NODE" else None
+    if table is not None:
+        numbers = (table[:, 0].astype(np.int64) + scope.offset).tolist()
+        return [f"{n}, {x!r}, {y!r}, {z!r}" for n, (x, y, z) in zip(numbers, scope.moved(table[:, 1:]).tolist())]
+    if block.name == "ELEMENT" and scope.offset == 0:
+        return block.texts
+    return [flat_line(block, i, line, scope, instances) for i, line in enumerate(block.texts)]
+
+
+def flat_line(block, index, line, scope, instances):
     fields = [field.strip() for field in line.split(",")]
     if block.name == "NODE" and len(fields) >= 2:
+        place = block.place_at(index)
         position = [number(field or "0", place) for field in (fields[1:4] + ["0", "0"])[:3]]
         fields[1:4] = [repr(float(value)) for value in scope.moved(position)]
-    last = len(fields)
-    if block.name in ("NODE", "SURFACE", "BOUNDARY"):
+    last, step = len(fields), 1
+    if block.name in FIRST:
         last = 1
+    elif block.name == "EQUATION":
+        last, step = (len(fields), 3) if len(fields) > 2 and fields[2] else (0, 1)
     elif "GENERATE" in block.options:
         last = 2
-    elif block.name not in NUMBERED and block.name not in ("TIE", "CONTACT PAIR"):
+    elif block.name not in NUMBERED and block.name not in PAIRS:
         return line
-    changed = [flat_text(field, scope, instances) if field else field for field in fields[:last]]
-    return ", ".join(changed + fields[last:])
+    for i in range(0, last, step):
+        if fields[i]:
+            fields[i] = flat_text(fields[i], scope, instances)
+    return ", ".join(fields)

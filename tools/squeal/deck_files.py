@@ -2,6 +2,7 @@
 
 import math
 import re
+import warnings
 
 import numpy as np
 
@@ -32,24 +33,68 @@ def included(file, line, name, depth):
 # ---- Abaqus and CalculiX
 
 DATA_FILES = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "BOUNDARY"}  # whose INPUT names a file of their data
-MADE_OR_MOVED = {"SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "SYMMETRIC MODEL GENERATION"}  # nodes
 
 
 class Block:
     """One keyword: *NAME, KEY=VALUE, ... and the lines of data below it."""
 
     def __init__(self, place, name, options):
-        self.place, self.name, self.options, self.lines = place, name, options, []
+        self.place, self.name, self.options = place, name, options
+        self.texts, self.numbers, self.files = [], [], []  # of the lines; files as (first line that is theirs, file)
+
+    def add(self, file, number, text):
+        if not self.files or self.files[-1][1] != file:
+            self.files.append((len(self.texts), file))
+        self.texts.append(text)
+        self.numbers.append(number)
+
+    def place_at(self, index):
+        file = next(file for first, file in reversed(self.files) if first <= index)
+        return f"{file}, line {self.numbers[index]}"
+
+    def place_of(self, number):
+        """Where a line begins with this number."""
+        return next((self.place_at(i) for i, text in enumerate(self.texts) if text.split(",")[0].strip() == str(number)), self.place)
+
+    def with_lines(self, texts):
+        """A copy with other data in the same places."""
+        copy = Block(self.place, self.name, dict(self.options))
+        copy.texts, copy.numbers, copy.files = texts, self.numbers, self.files
+        return copy
+
+    @property
+    def lines(self):
+        return [(self.place_at(i), text) for i, text in enumerate(self.texts)]
 
     def rows(self, least=0, what=""):
         """(place, fields) of every line of data; one with fewer than the least number of fields is refused."""
-        for place, line in self.lines:
+        for index, line in enumerate(self.texts):
+            place = self.place_at(index)
             fields = [field.strip() for field in line.split(",")]
             while fields and fields[-1] == "":
                 fields.pop()
             if len(fields) < least:
                 raise Problem(f"{place}: '{line[:60]}': {len(fields)} fields; expected {what}")
             yield place, fields
+
+    def table(self, width, kind):
+        """The data as rows of this many numbers, each of which begins a line; None if some line is of another form."""
+        texts = [text.rstrip(", \t") for text in self.texts]
+        ends = np.cumsum([text.count(",") + 1 for text in texts])
+        if not texts or ends[-1] % width or not np.isin(np.arange(width, ends[-1] + 1, width), ends).all():
+            return None
+        return numbers_in(",".join(texts), ends[-1], kind, width)
+
+
+def numbers_in(text, count, kind, width):
+    """So many numbers between commas as rows; None if there is anything else."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            values = np.fromstring(text, kind, sep=",")
+        except (ValueError, DeprecationWarning):
+            return None
+    return values.reshape(-1, width) if len(values) == count and np.isfinite(values).all() else None
 
 
 def blocks_of(file, depth=0, blocks=None):
@@ -59,8 +104,7 @@ def blocks_of(file, depth=0, blocks=None):
         line = line.strip()
         if not line or line.startswith("**"):
             continue
-        place = f"{file}, line {number}"
-        if head or line.startswith("*"):
+        if head or line[0] == "*":
             head += line
             if head.endswith(","):
                 continue  # goes on in the next line
@@ -69,17 +113,17 @@ def blocks_of(file, depth=0, blocks=None):
             options = {}
             for word in words:
                 key, _, value = word.partition("=")
-                options[key.strip().upper()] = value.strip().strip('"')
+                options[" ".join(key.upper().split())] = value.strip().strip('"')
             if name.upper() == "INCLUDE":
                 blocks_of(included(file, number, options.get("INPUT", ""), depth), depth + 1, blocks)
                 continue
-            blocks.append(Block(place, " ".join(name.upper().split()), options))
+            blocks.append(Block(f"{file}, line {number}", " ".join(name.upper().split()), options))
             if blocks[-1].name in DATA_FILES and "INPUT" in options:
                 blocks_of(included(file, number, options["INPUT"], depth), depth + 1, blocks)
         elif not blocks:
-            raise Problem(f"{place}: '{line[:60]}': expected a keyword, such as *NODE")
+            raise Problem(f"{file}, line {number}: '{line[:60]}': expected a keyword, such as *NODE")
         else:
-            blocks[-1].lines.append((place, line.replace('"', "")))
+            blocks[-1].add(file, number, line.replace('"', ""))
     if head:
         raise Problem(f"{file}: ends within '{head[:60]}', which goes on behind its last comma")
     return blocks
@@ -119,28 +163,6 @@ def node_table(nodes):
         if known is not position and tuple(known) != tuple(position):
             raise Problem(f"{place}: node {label} is at another position than in {before}: give it one position")
     return np.array(list(found), np.int64), np.array([at for _, at in found.values()], float).reshape(-1, 3)
-
-
-def abaqus_nodes(blocks):
-    """Numbers and positions of all *NODE blocks, in order."""
-    nodes = []
-    for block in blocks:
-        if block.name in MADE_OR_MOVED and (block.lines or block.name != "SYSTEM"):
-            raise Problem(f"{block.place}: *{block.name} makes or moves nodes: let the preprocessor write all nodes in "
-                          "global coordinates")
-        if block.name in ("INSTANCE", "ASSEMBLY"):
-            raise Problem(f"{block.place}: *{block.name}: the solver numbers the nodes of parts anew; write a flat deck "
-                          "(in Abaqus/CAE: Model, Edit Attributes, Do not use parts and assemblies in input files)")
-        if block.name != "NODE":
-            continue
-        if block.options.get("SYSTEM", "R").upper() != "R":
-            raise Problem(f"{block.place}: *NODE, SYSTEM={block.options['SYSTEM']}: only Cartesian nodes are read")
-        for place, fields in block.rows():
-            if not 2 <= len(fields) <= 7:
-                raise Problem(f"{place}: {len(fields)} fields; expected a node's number and its x, y, z")
-            position = [number(field or "0", place) for field in fields[1:4]]
-            nodes.append((place, whole(fields[0], place), position + [0.0] * (3 - len(position))))
-    return node_table(nodes)
 
 
 # ---- Nastran
@@ -261,13 +283,27 @@ class Systems:
         """Basic coordinates of a point that is given in a system."""
         origin, axes = self.frame(number, place)
         a, b, c = at
-        kind = self.cards[number].name[-1] if number else "R"
+        kind = self.kind(number)
         if kind == "C":
             a, b = a * np.cos(np.radians(b)), a * np.sin(np.radians(b))
         elif kind == "S":  # radius, angle from z, angle about z
             polar, around = np.radians(b), np.radians(c)
             a, b, c = a * np.sin(polar) * np.cos(around), a * np.sin(polar) * np.sin(around), a * np.cos(polar)
         return origin + axes @ np.array([a, b, c])
+
+    def kind(self, number):
+        return self.cards[number].name[-1] if number in self.cards else "R"
+
+    def keys(self, number, place):
+        """Keys of a scene's axes."""
+        origin, axes = self.frame(number, place)
+        kind = self.kind(number)
+        if kind == "S":
+            raise Problem(f"{place}: motions along the axes of the spherical system {number}: expected a Cartesian or "
+                          "cylindrical one")
+        if kind == "C":
+            return {"cylinder": {"axis": axes[:, 2].tolist(), "centre": origin.tolist()}}
+        return {"axis_1": axes[:, 0].tolist(), "axis_2": axes[:, 1].tolist()}
 
     def are_basic_axes(self, number, place):
         """Whether motions along the axes of a system are those along x, y and z."""

@@ -5,10 +5,9 @@ Node orders: Abaqus, VTK (meshio) and gmsh list the mid-side nodes of 10-node te
 and Nastran those of bricks. An order is here the list of the edges whose mid-side nodes follow the corners.
 """
 
-from collections import Counter
-
 import numpy as np
 from squeal.deck_files import Problem
+from squeal.deck_joints import Joints
 
 BOTTOM, TOP = [(0, 1), (1, 2), (2, 3), (3, 0)], [(4, 5), (5, 6), (6, 7), (7, 4)]
 UP = [(0, 4), (1, 5), (2, 6), (3, 7)]
@@ -45,6 +44,7 @@ def gmsh_order(kind, code):
 class Part:
     def __init__(self, elements, material=None, thickness=0.0):
         self.elements, self.material, self.thickness = elements, material, thickness
+        self.axes = None  # of an orthotropic material: axis_1 and axis_2, or cylinder
 
 
 class Model:
@@ -60,16 +60,25 @@ class Model:
         self.node_sets = {}  # name: nodes
         self.materials = {}  # name: {"young": , "poisson": , "density": , "loss_factor": , "alpha": , "beta": }
         self.loss_factor = 0.0  # of all parts, beside those of their materials
-        self.supports = []  # (name of a node set, motions)
+        self.supports = []  # (name of a node set, motions, other keys of its table)
         self.ties = []  # (slave, master)
-        self.contacts = []  # (slave, master)
-        self.notes = []  # what the deck has and the mesh has not
-        self.places = {}  # of the elements in the deck
+        self.contacts = []  # (slave, master, other keys of its table)
+        self.forces = []  # (name of a node set, keys): on groups; those on nodes of their own are among the joints
+        self.pressures = []  # (name of a surface, keys)
+        self.masses = []  # (name of a node set, mass)
+        self.bolts = []  # (name of a surface, keys)
+        self.joints = Joints()
+        self.steps = []  # (name, {key of a load: factor}, factor of friction, names of bolts)
+        self.gravity = None
+        self.band = 0.0  # [Hz] of the modes that the deck asks for
+        self.notes = []  # what the deck has and the scene has not
+        self.places = {}  # of the elements in the deck: texts, or blocks that find them
 
     def add_element(self, place, number, kind, nodes, code):
         if number in self.elements:
-            raise Problem(f"{place}: element {number} is there twice, first in {self.places[number]}; give it another "
-                          "number")
+            before = self.places[number]
+            before = before if isinstance(before, str) else before.place_of(number)
+            raise Problem(f"{place}: element {number} is there twice, first in {before}; give it another number")
         missing = [node for node in nodes if node not in self.nodes]
         if missing:
             raise Problem(f"{place}: element {number} has node {missing[0]}, which the deck does not define")
@@ -93,47 +102,76 @@ class Model:
     def solids(self):
         return [number for number, (kind, _) in self.elements.items() if kind in KINDS]
 
+    def add_elements(self, block, kind, table, code):
+        """Rows of a number and its nodes at once; False, and nothing is added, where one of them is wrong."""
+        numbers = table[:, 0].tolist()
+        labels = np.fromiter(self.nodes, np.int64, len(self.nodes))
+        if len(set(numbers)) < len(numbers) or not self.elements.keys().isdisjoint(numbers):
+            return False
+        if not np.isin(table[:, 1:], labels).all():
+            return False
+        ordered = table[:, [1 + i for i in gmsh_order(kind, code)]]
+        self.elements.update(zip(numbers, ((kind, tuple(nodes)) for nodes in ordered.tolist())))
+        self.places.update(dict.fromkeys(numbers, block))
+        return True
+
     def free_faces(self, numbers):
-        """Faces that belong to one of these solid elements alone."""
-        faces = {}
-        count = Counter()
-        for number in numbers:
-            for face in self.faces(number):
-                key = corners_of(face)
-                faces[key] = face
-                count[key] += 1
-        return {key: face for key, face in faces.items() if count[key] == 1}
+        """Faces that belong to one of these solid elements alone, by their corners."""
+        owners, keys = [], []
+        for kind, (_, _, _, faces) in KINDS.items():
+            of_kind = [n for n in numbers if self.elements[n][0] == kind]
+            if not of_kind:
+                continue
+            nodes = np.array([self.elements[n][1] for n in of_kind])
+            for i, face in enumerate(faces):
+                owners.append(np.stack([of_kind, np.full(len(of_kind), i)], axis=1))
+                keys.append(sorted_corners(nodes[:, face]))
+        if not keys:
+            return {}
+        owners, keys = np.concatenate(owners), np.concatenate(keys)
+        order = np.lexsort(keys.T)
+        differs = (keys[order][1:] != keys[order][:-1]).any(axis=1)
+        first = np.concatenate([[True], differs])
+        alone = order[first & np.concatenate([differs, [True]])]
+        faces = [self.faces(number)[i] for number, i in owners[np.sort(alone)].tolist()]
+        return {corners_of(face): face for face in faces}
 
     def drop_loose_nodes(self):
         """Nodes of sets that no element has, such as reference nodes."""
         used = {node for _, nodes in self.elements.values() for node in nodes}
+        joined = set(self.joints.ends()) - used | self.joints.of_bolts
         for name, nodes in list(self.node_sets.items()):
             kept = [node for node in dict.fromkeys(nodes) if node in used]
-            lost = len(set(nodes)) - len(kept)
+            lost = len(set(nodes) - joined) - len(kept)
             self.node_sets[name] = kept
-            if not kept:
-                its = " and its support" if any(name == of for of, _ in self.supports) else ""
+            if not kept and not lost:
+                del self.node_sets[name]  # of reference points
+            elif not kept:
+                its = " and its support" if any(name == of for of, *_ in self.supports) else ""
                 self.notes.append(f"the set {name}{its}, whose nodes no element has")
                 del self.node_sets[name]
             elif lost:
                 self.notes.append(f"{lost} nodes of the set {name}, which no element has")
-        self.supports = [(name, motions) for name, motions in self.supports if name in self.node_sets]
+        self.supports = [support for support in self.supports if support[0] in self.node_sets]
 
     def drop_idle_supports(self):
         """squeal refuses a support that holds rotations of solids and nothing else."""
         turning = self.nodes_with_rotations()
-        for name, motions in list(self.supports):
-            if not {"x", "y", "z"} & set(motions) and turning.isdisjoint(self.node_sets[name]):
+        kept = []
+        for name, motions, keys in self.supports:
+            if {"x", "y", "z"} & set(motions) or not turning.isdisjoint(self.node_sets[name]):
+                kept.append((name, motions, keys))
+            else:
                 self.notes.append(f"the support of {name} along {' '.join(motions)}: its nodes have no rotations")
-                self.supports.remove((name, motions))
+        self.supports = kept
 
     def nodes_with_rotations(self):
         shells = [n for part in self.parts.values() for n in part.elements if self.elements[n][0] in FLAT]
         return {node for n in shells for node in self.elements[n][1]}
 
-    def unused(self, name):
-        """The name, or one like it that no group has."""
-        while any(name in groups for groups in (self.parts, self.surfaces, self.node_sets, self.element_sets)):
+    def unused(self, name, others=()):
+        """The name, or one like it that no group has, nor any of the others."""
+        while name in others or any(name in of for of in (self.parts, self.surfaces, self.node_sets, self.element_sets)):
             name += "_"
         return name
 
@@ -158,18 +196,23 @@ class Model:
                 self.move(self.element_sets, name, "_elements", "a set of elements")
 
     def move(self, groups, name, ending, what):
-        """Under another name, which supports, ties and contacts follow."""
+        """Under another name, which what names nodes or faces follows."""
         shown = self.unused(name + ending)
         self.notes.append(f"the name {name} of {what}, which another group has: it is {shown}")
         groups[shown] = groups.pop(name)
         if groups is self.node_sets:
-            self.supports = [(shown if of == name else of, motions) for of, motions in self.supports]
+            for rows in (self.supports, self.forces, self.masses):
+                rows[:] = [(shown if row[0] == name else row[0], *row[1:]) for row in rows]
+            self.joints.call_group(name, shown, faces=False)
         elif groups is self.surfaces:
             self.call_faces(name, shown)
+            if name not in self.node_sets:
+                self.joints.call_group(name, shown, faces=False)
 
     def call_faces(self, name, shown):
-        self.ties, self.contacts = ([tuple(shown if of == name else of for of in pair) for pair in pairs]
-                                    for pairs in (self.ties, self.contacts))
+        for rows, ends in ((self.ties, 2), (self.contacts, 2), (self.pressures, 1), (self.bolts, 1)):
+            rows[:] = [(*(shown if of == name else of for of in row[:ends]), *row[ends:]) for row in rows]
+        self.joints.call_group(name, shown, faces=True)
 
     def name_faces_of_node_sets(self):
         """A set of nodes that covers free faces is a surface too, NAME_faces where it has other nodes besides: contacts
@@ -184,11 +227,14 @@ class Model:
             keys = {key for node in nodes for key in touching.get(node, []) if wanted.issuperset(free[key])}
             if keys:
                 shown = name
-                if {node for key in keys for node in free[key]} == wanted:
+                covered = {node for key in keys for node in free[key]}
+                if covered == wanted:
                     del self.node_sets[name]  # the surface has the same nodes
                 else:
                     shown = self.unused(name + "_faces")
                     self.call_faces(name, shown)
+                    if shown in self.joints.rigid_groups():
+                        self.notes.append(f"{len(wanted - covered)} nodes of {name} in its rigid coupling, which are on no face of it")
                 self.surfaces[shown] = [free[key] for key in sorted(keys, key=sorted)]
 
     def drop_ties_without_faces(self):
@@ -219,6 +265,14 @@ class Model:
         for number in numbers:
             found.setdefault(labels[index[self.elements[number][1][0]]], []).append(number)
         return list(found.values())
+
+
+def sorted_corners(corners):
+    """Ascending, each once, behind -1 that fill up to four."""
+    keys = np.full((len(corners), 4), -1)
+    keys[:, 4 - corners.shape[1] :] = np.sort(corners, axis=1)
+    keys[:, 1:][keys[:, 1:] == keys[:, :-1]] = -1
+    return np.sort(keys, axis=1)
 
 
 def corners_of(face):

@@ -1,23 +1,97 @@
-"""Meshes of Nastran: bulk data to a mesh_model.Model. Names of properties come from the comments that preprocessors write."""
+"""Decks of Nastran and OptiStruct to a mesh_model.Model: nodes, elements, properties, materials, supports, sets; other
+cards by the handlers of nastran_joining. Names come from the comments that preprocessors write."""
 
 import re
 from collections import Counter
 
-from squeal.deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes, sections_of, whole
-from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part
+from squeal import nastran_joining
+import numpy as np
+from squeal.deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes, number, sections_of, whole
+from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, corners_of
+from squeal.nastran_properties import note_shell_fields, read_materials, read_properties
 
 ELEMENTS = {("CHEXA", 8): "hex8", ("CHEXA", 20): "hex20", ("CPENTA", 6): "wedge6", ("CTETRA", 4): "tet4",
-            ("CTETRA", 10): "tet10", ("CQUAD4", 4): "quad4", ("CTRIA3", 3): "tri3"}
-CORNERS = {"CHEXA": (8, 20), "CPENTA": (6, 15), "CTETRA": (4, 10), "CQUAD4": (4, 4), "CTRIA3": (3, 3)}
-READ = {"GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "PSOLID", "PSHELL", "MAT1", "SPC", "SPC1", "SPCADD", "SET1",
-        "SET3", "PARAM", "ENDDATA", *CORNERS}
-SHELL_FIELDS = {"CQUAD4": {"ZOFFS": (9,), "T1 to T4": (12, 13, 14, 15)},
-                "CTRIA3": {"ZOFFS": (8,), "T1 to T3": (12, 13, 14)}}
+            ("CTETRA", 10): "tet10", ("CQUAD4", 4): "quad4", ("CTRIA3", 3): "tri3", ("CTRIA6", 6): "tri6", ("CQUAD8", 8): "quad8"}
+CORNERS = {"CHEXA": (8, 20), "CPENTA": (6, 15), "CTETRA": (4, 10), "CQUAD4": (4, 4), "CTRIA3": (3, 3), "CTRIA6": (6, 6),
+           "CQUAD8": (8, 8), "CPYRAM": (5, 13)}
+WITHOUT_ELEMENT = {("CPENTA", 15), ("CPYRAM", 5), ("CPYRAM", 13)}
+READ = {"GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "PSOLID", "PSHELL", "MAT1", "MAT9", "MATORT", "SPC", "SPC1", "SPCADD",
+        "SET1", "SET3", "PARAM", "ENDDATA", *CORNERS, *nastran_joining.READ}
+
+
+class Deck:
+    """What the handlers of cards share."""
+
+    def __init__(self, file, cards):
+        self.model, self.cards = Model(file), cards
+        self.names = names_in_comments(file)
+        self.systems, self.turned = Systems(cards), {}
+        self.properties = {(card.name, card.field(2)): card for card in cards if card.name in nastran_joining.PROPERTIES}
+        self.surfaces = {}  # names of SURF and SET by their numbers
+        self.pressed = {}  # faces by pressure
+        self.listed = listed
+
+    def line_of(self, card):
+        file, _, line = card.place.rpartition(", ")
+        return line if file == str(self.model.source) else card.place
+
+    def note(self, what, card):
+        self.model.notes.append(f"{what} ({self.line_of(card)})")
+
+    def number(self, text, card):
+        return number(text, f"{card.place}, {card.name}")
+
+    def new_set(self, name, nodes):
+        name = self.model.unused(name)
+        self.model.node_sets[name] = nodes
+        return name
+
+    def distance(self, a, b):
+        nodes = self.model.nodes
+        return float(np.linalg.norm(nodes[b] - nodes[a])) if a in nodes and b in nodes else 0.0
+
+    def frame_between(self, card, a, b, index):
+        """Axes of a line from node to node: x along it, y in the plane of a vector or node of the card; None without one."""
+        nodes = self.model.nodes
+        if a not in nodes or b not in nodes:
+            return None
+        if card.field(index) and not card.field(index + 1) and card.field(index).isdecimal():
+            plane = nodes.get(card.whole(index), nodes[a]) - nodes[a]
+        else:
+            plane = np.array([card.number(i, 0.0) for i in range(index, index + 3)])
+        x = nodes[b] - nodes[a]
+        z = np.cross(x, plane)
+        if not np.linalg.norm(z) > 1e-9 * np.linalg.norm(x) * np.linalg.norm(plane):
+            return None
+        x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
+        return np.stack([x, np.cross(z, x), z], axis=1)
+
+    def face_of(self, number, grids):
+        """The face of an element that two grids name: opposite corners, of triangles one corner, of tetrahedra one
+        corner and the node that is off the face."""
+        kind, nodes = self.model.elements.get(number, (None, ()))
+        if kind is None or not set(grids) <= set(nodes):
+            return None
+        if kind in FLAT:
+            return nodes
+        for face in self.model.faces(number):
+            corners = face[: len(corners_of(face))]
+            if kind.startswith("tet"):
+                if len(grids) == 2 and grids[0] in corners and grids[1] not in corners:
+                    return face
+            elif len(grids) == 1 and len(corners) == 3 and grids[0] in corners:
+                return face
+            elif len(grids) == 2 and len(corners) == 4 and grids[0] in corners and corners[corners.index(grids[0]) - 2] == grids[1]:
+                return face
+            elif len(grids) == 2 and len(corners) == 3 and set(grids) <= set(corners):
+                return face
+        return None
 
 
 def read_bdf(file):
     cards = cards_of(file)
-    model = Model(file)
+    deck = Deck(file, cards)
+    model = deck.model
     labels, positions = nastran_nodes(cards)
     model.nodes = dict(zip(labels.tolist(), positions))
     if not model.nodes:
@@ -30,20 +104,19 @@ def read_bdf(file):
         if card.name in CORNERS:
             read_element(card, model, of_property)
     note_shell_fields(cards, model)
-    read_materials(cards, model)
-    read_properties(cards, model, of_property, names_in_comments(file))
+    read_materials(cards, deck)
+    read_properties(cards, deck, of_property)
     case = "\n".join(line for _, line in sections_of(file)[0])
-    read_supports(cards, case, model)
-    read_sets(cards, case, model)
+    deck.turned = turned_nodes(cards)
+    read_supports(cards, case, deck)
+    read_sets(cards, case, deck)
+    for name in ("SURF", None):  # surfaces before contacts
+        for card in cards:
+            if card.name in nastran_joining.HANDLERS and (card.name == "SURF") == (name == "SURF"):
+                nastran_joining.HANDLERS[card.name](card, deck)
+    nastran_joining.read_loads(cards, case, deck)
+    model.band = max((card.number(4, 0.0) for card in cards if card.name == "EIGRL"), default=0.0)
     return model
-
-
-def note_shell_fields(cards, model):
-    for name, fields in SHELL_FIELDS.items():
-        for what, places in fields.items():
-            count = sum(any(card.number(i, 0.0) for i in places) for card in cards if card.name == name)
-            if count:
-                model.notes.append(f"{what} of {count} {name}")
 
 
 def read_element(card, model, of_property):
@@ -56,97 +129,37 @@ def read_element(card, model, of_property):
     if card.name in ("CQUAD4", "CTRIA3"):
         texts = texts[:fewest]
     if (card.name, len(texts)) not in ELEMENTS:
-        raise Problem(f"{card.place}: {card.name} {card.field(2)} has {len(texts)} nodes; expected {fewest} or {most}"
-                      + (", of which 15 have no element in squeal" if most == 15 else ""))
+        known = [str(count) for name, count in ELEMENTS if name == card.name]
+        lacking = [str(count) for name, count in sorted(WITHOUT_ELEMENT) if name == card.name]
+        raise Problem(f"{card.place}: {card.name} {card.field(2)} has {len(texts)} nodes; expected {' or '.join([*known, *lacking])}"
+                      + (f", of which {' and '.join(lacking)} have no element in squeal" if lacking else ""))
     nodes = [card.whole(4 + i) for i in range(len(texts))]
     number = card.whole(2)
     model.add_element(card.place, number, ELEMENTS[card.name, len(texts)], nodes, "nastran")
     of_property.setdefault(card.whole(3, number), []).append(number)
 
 
-def read_materials(cards, model):
-    """GE of a material and G of all are loss factors; WTMASS multiplies densities."""
-    values = {}
-    for card in cards:
-        if card.name == "PARAM":
-            values[card.field(2).upper()] = card
-    others = sorted(set(values) - {"WTMASS", "G", "POST"})
-    if others:
-        model.notes.append("PARAM " + ", ".join(others))
-    mass = values["WTMASS"].number(3, 1.0) if "WTMASS" in values else 1.0
-    model.loss_factor = values["G"].number(3, 0.0) if "G" in values else 0.0
-    for card in by_number(cards, "MAT1").values():
-        young, shear, poisson = (card.number(i, 0.0) for i in (3, 4, 5))
-        if card.field(5) == "" and young and shear:
-            poisson = young / (2 * shear) - 1
-        young = young or 2 * shear * (1 + poisson)
-        model.materials[card.field(2)] = {"young": young, "poisson": poisson, "density": card.number(6, 0.0) * mass,
-                                          "loss_factor": card.number(9, 0.0)}
-
-
-def by_number(cards, *names):
-    found = {}
-    for card in cards:
-        if card.name in names:
-            before = found.setdefault(card.whole(2), card)
-            if before.fields != card.fields:
-                raise Problem(f"{card.place}: {card.name} {card.field(2)} is there twice, first in {before.place}; "
-                              "keep one")
-    return found
+KEYWORDS = {"PROP": "PROP", "CONTACTSURF": "SURF", "SET": "SET"}
 
 
 def names_in_comments(file):
-    """Names of properties by their numbers, as HyperMesh, ANSA and Simcenter write them into comments."""
+    """Names by keyword and number, as HyperMesh, ANSA and Simcenter write them into comments."""
     names = {}
     for _, line in lines_of(file):
-        if found := re.match(r'\$HMNAME PROP\s+(\d+)\s*"([^"]+)"', line):
-            names[int(found[1])] = found[2]
+        if line[:1] == "P":
+            if (found := re.match(r"P(?:SOLID|SHELL)\W+(\d+)", line)) and "next" in names:
+                names["PROP", found[1]] = names.pop("next")
+        if line[:1] != "$":
+            continue
+        if found := re.match(r'\$HMNAME (\w+)\s+(\d+)\s*"([^"]+)"', line):
+            names[KEYWORDS.get(found[1], found[1]), found[2]] = found[3]
+        elif found := re.match(r'\$HMSET\s+(\d+)\s+\d+\s*"([^"]+)"', line):
+            names["SET", found[1]] = found[2]
         elif found := re.match(r"\$ANSA_NAME(?:_COMMENT)?;(\d+);P\w+;([^;]+)", line):
-            names[int(found[1])] = found[2]
+            names["PROP", found[1]] = found[2]
         elif found := re.match(r"\$\*\s+Property:\s*(.+)", line):
             names["next"] = found[1].strip()
-        elif (found := re.match(r"P(?:SOLID|SHELL)\W+(\d+)", line)) and "next" in names:
-            names[int(found[1])] = names.pop("next")
     return names
-
-
-def read_properties(cards, model, of_property, names):
-    """A part for every property; flat elements on the faces of solids are surfaces, whatever their property."""
-    properties = by_number(cards, "PSOLID", "PSHELL")
-    free = model.free_faces(model.solids())
-    for pid, elements in of_property.items():
-        name = names.get(pid, f"property_{pid}")
-        if model.unused(name) != name:
-            name += f"_{pid}"
-        card = properties.get(pid)
-        material = card.field(3) if card else None
-        flat = [n for n in elements if model.elements[n][0] in FLAT]
-        solid = [n for n in elements if model.elements[n][0] in KINDS]
-        if solid:
-            model.parts[name] = Part(solid, material)
-        thickness = card.number(4, 0.0) if card and card.name == "PSHELL" else 0.0
-        if flat and all(frozenset(model.elements[n][1]) in free for n in flat):
-            shown = model.unused(name if not solid else name + "_faces")
-            model.surfaces[shown] = [model.elements[n][1] for n in flat]
-            if thickness:
-                model.notes.append(f"the thickness {thickness:g} of PSHELL {pid}, whose elements lie on solids: {shown} "
-                                   "is a surface; a [[part]] with a thickness makes shells of it")
-        elif flat:
-            model.parts[model.unused(name if not solid else name + "_shells")] = Part(flat, material, thickness)
-            note_shell_property(card, model)
-
-
-def note_shell_property(card, model):
-    """What a homogeneous shell of one material has not: other bending, shear or membrane, and a mass of its own."""
-    if card is None or card.name != "PSHELL":
-        return
-    found = ["MID2"] if card.field(5) != card.field(3) else []
-    found += ["MID4"] if card.field(12) else []
-    for what, i, usual in (("12I/T**3", 6, 1.0), ("TS/T", 8, 5 / 6), ("NSM", 9, 0.0)):
-        if abs(card.number(i, usual) - usual) > 1e-3:
-            found.append(what)
-    if found:
-        model.notes.append(f"{', '.join(found)} of PSHELL {card.field(2)}")
 
 
 def listed(texts, place):
@@ -179,9 +192,10 @@ def listed(texts, place):
     return found
 
 
-def read_supports(cards, case, model):
+def read_supports(cards, case, deck):
     """Of each set number and its motions, a set of nodes; the motions that GRID holds too. Nodes of solids have no
-    rotations."""
+    rotations; nodes that no element has are held as reference points."""
+    model = deck.model
     default = next((card.field(8) for card in cards if card.name == "GRDSET"), "")
     applied = applied_supports(cards, case, model)
     held = {}
@@ -190,32 +204,44 @@ def read_supports(cards, case, model):
             continue
         if card.name == "SPC1":
             nodes = [n for n in listed(card.fields[2:], card.place) if n in model.nodes]
-            held.setdefault((card.field(2), card.field(3)), []).extend(nodes)
+            held.setdefault((card.field(2), card.field(3), 0.0), []).extend(nodes)
         elif card.name == "SPC":
             for i in (3, 6):
                 if card.field(i):
-                    held.setdefault((card.field(2), card.field(i + 1)), []).append(card.whole(i))
-                    if card.number(i + 2, 0.0):
-                        model.notes.append(f"the enforced motion {card.field(i + 2)} of node {card.field(i)} in SPC "
-                                           f"{card.field(2)}: it is held at zero")
+                    held.setdefault((card.field(2), card.field(i + 1), card.number(i + 2, 0.0)), []).append(card.whole(i))
         elif card.name == "GRID" and (card.field(8) or default).strip("0"):
-            held.setdefault(("grid", card.field(8) or default), []).append(card.whole(2))
-    turned, turning, idle = turned_nodes(cards), model.nodes_with_rotations(), 0
-    for (number, motions), nodes in held.items():
-        if not motions.isdecimal() or not set(motions) <= set("123456"):
-            raise Problem(f"{model.source}: SPC {number} holds '{motions}'; expected digits from 1 to 6")
-        moving = [n for n in dict.fromkeys(nodes) if n in turning or set(motions) & set("123")]
-        idle += len(set(nodes)) - len(moving)
-        oblique = [n for n in moving if n in turned]
-        if oblique and not ({"1", "2", "3"} <= set(motions) and len(set(motions) & set("456")) in (0, 3)):
-            raise Problem(f"{turned[oblique[0]]}: SPC {number} holds motions {motions} of node {oblique[0]} in a turned system: "
-                          "expected all translations, or motions along the basic axes")
-        if moving:
-            name = f"spc_{number}_{motions}"
-            model.node_sets[name] = moving
-            model.supports.append((name, [MOTIONS[int(digit) - 1] for digit in sorted(set(motions))]))
+            held.setdefault(("grid", card.field(8) or default, 0.0), []).append(card.whole(2))
+    used = {node for _, nodes in model.elements.values() for node in nodes}
+    turning, idle = model.nodes_with_rotations(), 0
+    for (number, digits, value), nodes in held.items():
+        if not digits.isdecimal() or not set(digits) <= set("123456"):
+            raise Problem(f"{model.source}: SPC {number} holds '{digits}'; expected digits from 1 to 6")
+        motions = [MOTIONS[int(digit) - 1] for digit in sorted(set(digits))]
+        for n in nodes:
+            if n not in used:
+                model.joints.held.setdefault(n, set()).update(motions)
+                model.joints.moved.setdefault(n, {}).update(dict.fromkeys(motions, value) if value else {})
+        moving = [n for n in dict.fromkeys(nodes) if n in turning or set(digits) & set("123")]
+        idle += len(set(nodes) - set(moving))
+        hold(deck, f"spc_{number}_{digits}", motions, value, moving)
     if idle:
         model.notes.append(f"the held rotations of {idle} nodes that have none, as nodes of solids")
+
+
+def hold(deck, name, motions, value, nodes):
+    """A support of these nodes for each system that their motions are in."""
+    model, by_system = deck.model, {}
+    for n in nodes:
+        whole_motion = {"x", "y", "z"} <= set(motions) and len(motions) in (3, 6) and not value
+        by_system.setdefault(0 if whole_motion else deck.turned.get(n, (0,))[0], []).append(n)
+    for system, found in by_system.items():
+        shown = name + (f"_in_{system}" if system else "") + (f"_by_{value:g}" if value else "")
+        keys = deck.systems.keys(system, str(model.source)) if system else {}
+        for key, of in (("displacement", MOTIONS[:3]), ("rotation", MOTIONS[3:])):
+            if value and set(of) & set(motions):
+                keys = {**keys, key: [value if m in motions else 0.0 for m in of]}
+        model.node_sets[shown] = found
+        model.supports.append((shown, motions, keys))
 
 
 def applied_supports(cards, case, model):
@@ -249,25 +275,33 @@ def joined(numbers):
 
 
 def turned_nodes(cards):
-    """Places of the nodes whose motions are along other axes than the basic ones."""
+    """Number of the system and place, of the nodes whose motions are along other axes than the basic ones."""
     systems = Systems(cards)
     default = next((card.field(7) for card in cards if card.name == "GRDSET"), "")
     found = {}
     for card in cards:
-        if card.name == "GRID":
-            system = whole(card.field(7) or default or "0", card.place)
-            if system != -1 and not systems.are_basic_axes(system, card.place):
-                found[card.whole(2)] = card.place
+        if card.name == "GRID" and (card.field(7) or default):
+            system = whole(card.field(7) or default, card.place)
+            if system not in (-1, 0) and not systems.are_basic_axes(system, card.place):
+                found[card.whole(2)] = (system, card.place)
     return found
 
 
-def read_sets(cards, case, model):
-    """SET1 is of nodes, SET3 says what it is of; the case control's SET may be of nodes, elements or other things."""
+def read_sets(cards, case, deck):
+    """SET1 is of nodes, SET and SET3 say what they are of; the case control's SET may be of nodes, elements or others."""
+    model = deck.model
     for card in cards:
+        name = deck.names.get(("SET", card.field(2)), f"set_{card.field(2)}")
         if card.name == "SET1":
-            add_set(model, f"set_{card.field(2)}", listed(card.fields[1:], card.place), "GRID")
+            add_set(model, name, listed(card.fields[1:], card.place), "GRID")
         elif card.name == "SET3":
-            add_set(model, f"set_{card.field(2)}", listed(card.fields[2:], card.place), card.field(3).upper())
+            add_set(model, name, listed(card.fields[2:], card.place), card.field(3).upper())
+        elif card.name == "SET" and card.field(4).upper() in ("LIST", ""):
+            kind = {"NODE": "GRID", "GRID": "GRID", "ELEM": "ELEM"}.get(card.field(3).upper(), card.field(3))
+            add_set(model, name, listed(card.fields[8:], card.place), kind)
+            deck.surfaces.setdefault(card.field(2), name)
+        elif card.name == "SET":
+            deck.note(f"{name}, a SET of {card.field(3)} by {card.field(4)}", card)
     for number, items in re.findall(r"^\s*SET\s+(\d+)\s*=((?:[^\n]*,\s*\n)*[^\n]*)", case, flags=re.M | re.I):
         try:
             numbers = listed(items.replace(",", " ").split(), "")

@@ -10,7 +10,8 @@ import re
 
 import numpy as np
 import scipy.sparse as sparse
-from squeal.deck_files import Problem, Systems, abaqus_nodes, blocks_of, cards_of, nastran_nodes, number, whole
+from squeal.abaqus_nodes import abaqus_nodes
+from squeal.deck_files import Problem, Systems, blocks_of, cards_of, nastran_nodes, number, whole
 
 COLUMNS = ("rotor", "stator", "nx", "ny", "nz", "area", "gap")
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}

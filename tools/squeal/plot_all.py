@@ -1,7 +1,9 @@
 """Every picture of tools/plot: its name, what draws it, and what it shows."""
 
 from squeal import common
+from squeal import plot_captions
 from squeal import plot_contact
+from squeal import plot_model
 from squeal import plot_motion
 from squeal import plot_response
 from squeal import plot_robustness
@@ -9,40 +11,45 @@ from squeal import plot_shape
 from squeal import plot_spectra
 from squeal import plot_stability
 from squeal import plot_sweep
+from squeal import plot_thresholds
 from squeal.plot_basis import ABSENT, plt
 from squeal import Missing
 
-# Name: what draws it, whether it is of one run only, and what it shows.
+# Name: what draws it, whether it is of one run only, and what it shows: words, or what makes them of the runs and the figure.
 FIGURES = {
-    "shape": (plot_shape.draw_shape, False, "The mode that grows fastest, deformed and coloured by how much each place moves; "
-              "beside it one period of the limit cycle, if one was found."),
+    "model": (plot_model.draw_model, True, plot_captions.of_model),
+    "shape": (plot_shape.draw_shape, False, plot_captions.of_shape),
     "shapes": (plot_shape.draw_shapes, True, "The unstable modes, the fastest growing first."),
-    "modes": (plot_stability.draw_modes, False, "Every mode of the sliding brake. Those above zero grow and may squeal."),
+    "modes": (plot_stability.draw_modes, False, plot_captions.of_modes),
     "estimate": (plot_stability.draw_estimate, False, "Power of friction and of damping against amplitude: where they are equal "
                  "the vibration is estimated to settle."),
     "response": (plot_response.draw_response, False, "Displacement of the probes under a unit force at one of them, about "
                  "sliding, as a test rig measures it: magnitude and phase."),
-    "energy": (plot_motion.draw_energy, False, "Energy against time, as means over a period, beside that of the limit cycle."),
-    "spectrum": (plot_spectra.draw_spectrum, False, "Levels of the probes' velocities."),
-    "spectrogram": (plot_spectra.draw_spectrogram, False, "How the spectrum changes with time: harmonics come with lift-off."),
-    "cycle": (plot_motion.draw_cycle, False, "One period of the limit cycle: velocity against displacement of each probe, and "
-              "the state of each contact pair."),
-    "powers": (plot_motion.draw_powers, False, "What feeds the vibration and what takes its energy round one period. The means "
-               "of a limit cycle cancel."),
-    "pressure": (plot_contact.draw_pressure, False, "Contact pressure at rest."),
+    "energy": (plot_motion.draw_energy, False, plot_captions.of_energy),
+    "spectrum": (plot_spectra.draw_spectrum, False, plot_captions.of_spectrum),
+    "spectrogram": (plot_spectra.draw_spectrogram, False, "How the spectrum changes with time."),
+    "cycle": (plot_motion.draw_cycle, False, plot_captions.of_cycle),
+    "powers": (plot_motion.draw_powers, False, plot_captions.of_powers),
+    "pressure": (plot_contact.draw_pressure, False, plot_captions.of_pressure),
     "contact": (plot_contact.draw_contact, True, "Where the surfaces are open, stick and slip: four instants of the cycle, and "
                 "the parts of the period."),
     "liftoff": (plot_motion.draw_lift_off, False, "How much of the contact is lost, against time."),
     "newton": (plot_stability.draw_newton, False, "How the limit cycle was found: distance from periodic motion against periods "
                "integrated."),
     "branch": (plot_stability.draw_branch, True, "The limit cycle along a number of the scene."),
-    "sweep": (plot_sweep.draw_sweep, True, "Frequency and growth of the followed modes against a number of the scene; of two "
-              "numbers maps of stability and of what is heard. Dotted lines are thresholds, crosses points that failed."),
+    "sweep": (plot_sweep.draw_sweep, True, plot_captions.of_sweep),
+    "thresholds": (plot_thresholds.draw_thresholds, True, plot_captions.of_thresholds),
     "robustness": (plot_robustness.draw_robustness, True, "How likely modes are unstable where numbers are random, with the "
                    "intervals; growth of the samples; which numbers drive it."),
 }
 ONE_RUN = "it shows one run; give one results folder"
 ANIMATION = "One period, over and over: the whole, and what moves most, exaggerated."
+
+
+def caption_of(name, runs, figure):
+    """What a picture shows; of some by what is drawn in it."""
+    words = FIGURES[name][2]
+    return words(runs, figure) if callable(words) else words
 
 
 def figures(runs, only=(), spectrogram="probe"):

@@ -1,5 +1,7 @@
 """What the pictures of tools/plot share: units, colours, labels that keep apart, headings."""
 
+import tomllib
+
 from squeal import common
 
 common.needs("matplotlib", "numpy")
@@ -11,8 +13,15 @@ from squeal import Missing
 OPEN, STICK, SLIP = "#c9c9c9", ORANGE, BLUE  # of the contact states 0, 1 and 2
 STATES = {"open": OPEN, "stick": STICK, "slip": SLIP}
 REST, SQUEAL = "#dfe4ea", ("#f6c65b", "#e8662c", "#a3102a")  # colours of no amplitude, and of more and more
+PART_COLOURS = ("#7d93a8", "#c9a227", "#6b8f71", "#a0616a", "#8d7bb0", "#4f9d9d", "#b5835a", "#9aa35b")
 plt = common.pyplot(dpi=130)
 ABSENT = []  # the runs that a picture which is being drawn lacks, with the reason
+
+
+def scene_of(run):
+    """The scene that was run, with every default; empty where its file is not there."""
+    file = run.folder / "resolved.toml"
+    return tomllib.loads(file.read_text()) if file.exists() else {}
 
 
 def frequency_unit(largest):
@@ -41,11 +50,15 @@ def length_unit(values):
     return next(((size, unit) for size, unit in units if largest >= 0.1 * size), units[-1])
 
 
+def names_of(runs):
+    """The titles of their scenes, each once; of more than three the first and how many others."""
+    titles = list(dict.fromkeys(run.title for run in runs))
+    return " and ".join(titles) if len(titles) < 4 else f"{titles[0]} and {len(titles) - 1} others"
+
+
 def heading(runs, what):
-    """What is drawn, after the scene's title where there is one run; on two lines where one would be too long."""
-    title = runs[0].title
-    if len(runs) > 1 and any(run.title != title for run in runs):
-        return what
+    """What is drawn, after the titles of the scenes; on two lines where one would be too long."""
+    title = names_of(runs)
     return f"{title}:{' ' if len(title) + len(what) < 60 else chr(10)}{what}"
 
 

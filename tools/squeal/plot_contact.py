@@ -1,8 +1,9 @@
-"""Maps on the contact surfaces: pressure at rest, and open, stick and slip round the limit cycle."""
+"""Maps on the contact surfaces: pressure in steady sliding, and open, stick and slip round the limit cycle."""
 
 import numpy as np
 from matplotlib.collections import PolyCollection
-from squeal.plot_basis import STATES, cycle_words, heading, plt, state_colours, state_legend, those_with, unit_of
+from squeal.plot_basis import RED, STATES, cycle_words, heading, plt, state_colours, state_legend, those_with, unit_of
+from squeal.plot_places import places_of
 from squeal import Missing
 from squeal.surface import faces, node_cells
 
@@ -55,11 +56,33 @@ def label_plane(axes, patches, first_column):
         axes.set_ylabel(f"{'xyz'[plane[1]]} [mm]")
 
 
+def mark_place(axes, plane, place):
+    """Centre of pressure, the way of the rotor, and the edges where it enters and leaves, on a map in millimetres."""
+    centre = 1e3 * place.centre[plane]
+    axes.plot(*centre, "P", ms=9, color=RED, mec="white", mew=0.8)
+    if place.way is None:
+        return
+    way = place.way[plane]
+    reach = 0.25 * min(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
+    axes.annotate("", centre + reach * way, centre, arrowprops={"arrowstyle": "-|>", "color": "white", "lw": 2.4, "shrinkA": 6})
+    axes.annotate("", centre + reach * way, centre, arrowprops={"arrowstyle": "-|>", "color": RED, "lw": 1.3, "shrinkA": 6})
+    if place.leading is not None:
+        for words, at in (("leading", place.leading), ("trailing", place.trailing)):
+            axes.text(*(1e3 * at[plane]), words, fontsize=8, ha="center", va="center", color="black",
+                      bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.8})
+
+
+def place_words(place):
+    """Effective radius and the sliding speed there."""
+    words = [f"effective radius {1e3 * place.radius:.4g} mm"] if place.radius else []
+    return ", ".join(words + ([f"{place.speed:.3g} m/s"] if place.speed else []))
+
+
 def draw_pressure(runs):
     found = those_with(runs, lambda run: (patches_of(run), run.field("pairs/pressure")))
     count = max(len(patches) for _, (patches, _) in found)
     size, unit = unit_of(np.concatenate([pressure for _, (_, pressure) in found]), "Pa")
-    figure, panels = plt.subplots(len(found), count, figsize=(1 + 4.4 * count, 0.7 + 3.8 * len(found)), squeeze=False,
+    figure, panels = plt.subplots(len(found), count, figsize=(1 + 4.4 * count, 0.9 + 4.0 * len(found)), squeeze=False,
                                   layout="compressed")  # no wide margins beside maps of equal scales
     for row, (run, (patches, pressure)) in zip(panels, found):
         for axes in row[len(patches) :]:
@@ -70,9 +93,12 @@ def draw_pressure(runs):
             image.set_clim(0, pressure.max() / size)
             label_plane(row[column], of, column == 0)
             prefix = f"{run.folder.name}: " if len(runs) > 1 else ""
-            row[column].set_title(f"{prefix}{name_of(run, number)}\n{values.min():.3g} to {values.max():.3g} {unit}", fontsize=10)
-        figure.colorbar(image, ax=list(row[: len(patches)]), label=f"contact pressure at rest [{unit}]")
-    figure.suptitle(heading(runs, "contact pressure at rest"))
+            place = next(place for place in places_of(run) if place.number == number)
+            mark_place(row[column], of[0], place)
+            words = [f"{prefix}{name_of(run, number)}", f"{values.min():.3g} to {values.max():.3g} {unit}", place_words(place)]
+            row[column].set_title("\n".join(filter(None, words)), fontsize=9)
+        figure.colorbar(image, ax=list(row[: len(patches)]), label=f"contact pressure [{unit}]")
+    figure.suptitle(heading(runs, "contact pressure in steady sliding"))
     return figure
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 from squeal.plot_basis import heading, plt, those_with
 from squeal.plot_sweep import COLOURS
-from squeal import Missing, number_label
+from squeal.plot_numbers import words_of
+from squeal import Missing
 
 SHOWN = 8  # modes, those that are unstable most often
 
@@ -48,8 +49,8 @@ def draw_growth(axes, table):
     axes.hist(ratio[~unstable], bins=bins, color="0.7", label="stable")
     axes.hist(ratio[unstable], bins=bins, color=COLOURS[0], label="unstable")
     axes.axvline(0, color="0.2", lw=0.8)
-    axes.set_xlabel("largest growth rate over omega [%]")
-    axes.set_ylabel("samples")
+    axes.set_xlabel("largest growth rate over angular frequency [%]")
+    axes.set_ylabel("number of samples")
     axes.set_ylim(top=1.25 * axes.get_ylim()[1])  # the legend hides no bar
     axes.legend(fontsize=8, ncols=2, loc="upper center")
 
@@ -63,9 +64,9 @@ def draw_drivers(axes, robustness):
     axes.axvline(0, color="0.2", lw=0.8)
     axes.set_xlim(-1, 1)
     axes.set_xticks([-1, -0.5, 0, 0.5, 1])
-    axes.set_yticks(range(len(numbers)), [number_label(number["key"], number["name"]).replace(" (", "\n(") for number in numbers])
+    axes.set_yticks(range(len(numbers)), [words_of(number["key"], number["name"]).replace(" of ", "\nof ") for number in numbers])
     axes.invert_yaxis()
-    axes.set_xlabel("rank correlation with growth")
+    axes.set_xlabel("rank correlation with growth [-]")
 
 
 def draw_robustness(runs):

@@ -27,6 +27,14 @@ def pyvista():
     return module
 
 
+def swing_of(nodes, size):
+    """Length [m] that what moves most is drawn moving by, such that the moving region and the whole keep their form. size: how
+    much each node moves."""
+    moving = nodes[size > 0.25 * size.max()]
+    whole = np.linalg.norm(np.ptp(nodes, axis=0))
+    return min(SWING * np.linalg.norm(np.ptp(moving, axis=0)) or whole, WHOLE * whole)
+
+
 class Stage:
     """A run's surface in a PyVista window, seen from one place however it is deformed."""
 
@@ -38,10 +46,8 @@ class Stage:
         if not rims:
             raise Missing("the scene has points, and no surface to draw")
         self.size = size / size.max()
-        moving = np.flatnonzero(self.size > 0.25)
-        self.moving = self.nodes[moving]
-        whole = np.linalg.norm(np.ptp(self.nodes, axis=0))
-        self.swing = min(SWING * np.linalg.norm(np.ptp(self.moving, axis=0)) or whole, WHOLE * whole)  # [m]
+        self.moving = self.nodes[self.size > 0.25]
+        self.swing = swing_of(self.nodes, size)
         pv = pyvista()
         self.mesh = pv.PolyData(self.nodes, faces=np.concatenate([[len(rim), *rim] for rim in rims]))
         self.mesh["value"] = self.size

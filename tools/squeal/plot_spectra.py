@@ -101,11 +101,11 @@ def draw_spectrum(runs):
         shown = (frequency <= 1.02 * last) & (frequency > 0)
         level = decibel(amplitude[shown])
         words = label_of(run, runs, name) + ("" if (level > top - FLOOR).any() else ", beyond the axes")
-        if is_lines:  # probes side by side at each harmonic, by what their marks are wide
-            beside = (frequency[shown] + (k - (len(lines) - 1) / 2) * 0.01 * last) / size
-            axes.vlines(beside, top - FLOOR, np.maximum(level, top - FLOOR), color=colour(k), lw=1.6, alpha=0.7)
+        if is_lines:  # the first probe's are the broadest, so that all are seen at their frequency
+            broad = 1.2 * (len(lines) - k)
+            axes.vlines(frequency[shown] / size, top - FLOOR, np.maximum(level, top - FLOOR), color=colour(k), lw=broad)
             seen = level > top - FLOOR
-            axes.plot(beside[seen], level[seen], "o", ms=4, color=colour(k), label=words)
+            axes.plot(frequency[shown][seen] / size, level[seen], "os^Dv*"[k % 6], ms=5, color=colour(k), mec="white", mew=0.5, label=words)
         else:
             axes.plot(frequency[shown] / size, level, color=colour(k), lw=1, label=words)
     axes.set(xlabel=f"frequency [{unit}]", ylabel="level of velocity [dB re 1 nm/s]", ylim=(top - FLOOR, top + 5),

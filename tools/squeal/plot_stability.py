@@ -3,7 +3,8 @@
 import numpy as np
 from squeal.plot_basis import (RED, SLIP, colour, frequency_unit, heading, label_column, label_of, length_unit, mode_words, plt,
                         those_with)
-from squeal import Missing, number_label
+from squeal.plot_numbers import axis_label, unit_of_key, words_of
+from squeal import Missing
 
 LABELS = 12  # at most so many modes have one
 
@@ -40,20 +41,21 @@ def draw_modes(runs):
                       "s", ms=7, mfc="none", mec="0.6", label="projection on real modes")
         shades = (SLIP, RED) if len(found) == 1 else (colour(k), colour(k))
         count = f"{unstable.sum()} of {len(unstable)}"
-        axes.plot(frequency[~unstable] / size, growth[~unstable], "o", ms=4, color=shades[0], label=label_of(run, runs, "stable"))
-        axes.plot(frequency[unstable] / size, growth[unstable], "^", ms=8, color=shades[1], label=label_of(run, runs, f"unstable, {count}"))
+        for chosen, mark, wide, shade, words in ((~unstable, "o", 4, shades[0], "stable"), (unstable, "^", 8, shades[1], f"unstable, {count}")):
+            line, = axes.plot(frequency[chosen] / size, growth[chosen], mark, ms=wide, color=shade, label=label_of(run, runs, words))
+            line.of_modes = {"run": run.folder.name, "modes": [int(number) + 1 for number in np.flatnonzero(chosen)]}
         points += [(f / size, g) for f, g in zip(frequency[unstable], growth[unstable])]
         texts += [f"{label_of(run, runs)} {mode_words(f, g)}".strip() for f, g in zip(frequency[unstable], growth[unstable])]
         growths.append(growth)
     growths = np.concatenate(growths)
     axes.axhline(0, color="0.3", lw=0.8)
-    axes.set_ylabel("real part, growth rate [1/s]")
+    axes.set_ylabel("growth rate [1/s]")
     # Damping grows with frequency squared: without this scale the unstable modes would lie on the axis.
     scale = max(min((g for _, g in points), default=np.median(np.abs(growths))), 1e-12)
     if np.abs(growths).max() > 20 * scale:
         axes.set_yscale("symlog", linthresh=scale)
         axes.set_yticks(symlog_ticks(scale, growths.min(), growths.max()))
-        axes.set_ylabel("real part, growth rate [1/s], log away from 0")
+        axes.set_ylabel("growth rate, logarithmic away from 0 [1/s]")
     axes.margins(y=0.12)
     words = f", {found[0][1]['unstable_count']} unstable of {len(found[0][1]['modes'])}" if len(found) == 1 else ""
     if len(points) > LABELS:
@@ -192,7 +194,7 @@ def draw_branch(runs):
     frequency = np.array([point["frequency_hz"] for point in points])
     draw_along(above, points, amplitude / size, SLIP, "cycle")
     mark_events(above, branch["events"], points, amplitude / size)
-    above.set(ylabel=label, ylim=(0, 1.08 * amplitude.max() / size), title=heading([run], "branch of the limit cycle"))
+    above.set(ylabel=label, ylim=(0, 1.08 * amplitude.max() / size), title=heading([run], f"limit cycle against {words_of(branch['key'], branch['name'])}"))
     draw_along(middle, points, frequency, SLIP, "cycle")
     mark_events(middle, branch["events"], points, frequency)
     at = np.array([equilibrium["parameter"] for equilibrium in equilibria])
@@ -209,7 +211,7 @@ def draw_branch(runs):
             below.plot(event["parameter"], 0, EVENT_MARKS["Hopf"], color="black", ms=10, zorder=5)
     if any(event["kind"] == "Hopf" for event in branch["events"]):
         below.plot([], [], EVENT_MARKS["Hopf"], color="black", ms=10, ls="none", label="Hopf")
-    below.set(ylabel="growth rate [1/s]", xlabel=number_label(branch["key"], branch["name"]))
+    below.set(ylabel="growth rate [1/s]", xlabel=axis_label(branch["key"], branch["name"], unit_of_key(run, branch["key"])))
     for style, stability in (("-", "stable"), ("--", "unstable"), (":", "undecided")):
         if any(point["stability"] == stability for point in points):
             above.plot([], [], style, color="0.3", label=stability)

@@ -6,7 +6,8 @@ from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 from squeal.plot_basis import frequency_unit, heading, label_row, legend_below, plt, those_with
-from squeal import Missing, number_label
+from squeal.plot_numbers import axis_label, words_of
+from squeal import Missing
 
 COLOURS = ["#c0272d", "#1b6ca8", "#d95f02", "#2e8b57", "#7b3fa0", "#b5893a", "#008b8b", "#d6409f"]
 MARKS = "os^Dvp*X"
@@ -69,7 +70,7 @@ def sweep_of(results):
 
 def labels_of(sweep):
     """The swept numbers with their names and units."""
-    return [number_label(*number) for number in zip(sweep["keys"], sweep["names"], sweep["units"])]
+    return [axis_label(*number) for number in zip(sweep["keys"], sweep["names"], sweep["units"])]
 
 
 def strongest_tracks(sweep):
@@ -220,7 +221,7 @@ def draw_chart(results, sweep):
         mark_thresholds(axes[:, column], sweep, direction)
     # A mode keeps its colour: one label each.
     legend = {label: handle for ax in axes[0] for handle, label in zip(*ax.get_legend_handles_labels())} | legend
-    figure.suptitle(heading([results], "modes against " + number_label(sweep["keys"][0], sweep["names"][0])))
+    figure.suptitle(heading([results], "modes against " + words_of(sweep["keys"][0], sweep["names"][0])))
     legend_below(figure, legend)
     return figure
 

@@ -8,9 +8,14 @@ from pathlib import Path
 from squeal import common
 import numpy as np
 from PIL import Image
-from squeal.plot_all import ANIMATION, FIGURES, figures
-from squeal.plot_basis import length_unit
+from squeal.plot_all import ANIMATION, FIGURES, caption_of, figures
+from squeal.plot_basis import frequency_unit, length_unit, names_of
+from squeal.plot_motion import lift_off_of
+from squeal.plot_numbers import words_of
 from squeal.plot_shape import animate
+from squeal.report_alive import Alive
+from squeal.report_charts import charts_of
+from squeal.report_input import differences, input_of
 from squeal.report_style import STYLE
 from squeal.report_tables import number, numbers, paragraph, probability, rotation, strongest, table, text, values_of
 from squeal import Missing
@@ -24,18 +29,21 @@ def data(content, kind):
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
-def picture(content, kind, name, caption):
-    """Broad ones take the width of two."""
+TURNED = ("model", "shape", "shapes", "animation")  # pictures that the 3D view stands for
+
+
+def picture(content, kind, name, caption, charts="", whole=True):
+    """Broad ones take the width of two. charts: what answers a pointer, in place of the picture if it is the whole of it."""
     width, height = Image.open(io.BytesIO(content)).size
-    style = ' class="broad"' if width > 2 * height else ""
-    return (f'<figure{style}><div class="wide"><img src="{data(content, kind)}" alt="{text(name)}: {text(caption)}"></div>'
-            f"<figcaption>{text(caption)}</figcaption></figure>")
+    classes = [word for word, true in (("broad", width > 2 * height), ("live", charts and whole),
+                                       ("turned", name in TURNED)) if true]
+    return (f'<figure class="{" ".join(classes)}">{charts}<div class="wide"><img src="{data(content, kind)}" alt="{text(name)}: {text(caption)}">'
+            f"</div><figcaption>{text(caption)}</figcaption></figure>")
 
 
-def pictures(runs):
-    """All pictures of these runs, why the others are left out, and which runs they lack."""
+def drawn(runs, alive, names, prefix):
+    """Pictures of these names, and why others are left out or lack a run."""
     found, left_out = [], []
-    names = [name for name, (_, alone, _) in FIGURES.items() if len(runs) == 1 or not alone]  # each run has its own, too
     for name, figure, absent in figures(runs, names):
         left_out += [f"{name} lacks {reason}" for reason in absent]
         if isinstance(figure, Missing):
@@ -44,12 +52,23 @@ def pictures(runs):
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "picture.png"
             common.save_picture(figure, file, 110)
-            found.append(picture(file.read_bytes(), "image/png", name, FIGURES[name][2]))
-    if len(runs) == 1:
+            charts, whole = charts_of(figure) if name not in TURNED else ([], True)
+            title = figure._suptitle.get_text() if charts and figure._suptitle else ""
+            found.append(picture(file.read_bytes(), "image/png", name, prefix + caption_of(name, runs, figure), alive.add(charts, title), whole))
+    return found, left_out
+
+
+def pictures(runs, alive, among=1):
+    """All pictures of these runs, why the others are left out, and which runs they lack. among: runs on the page, where each
+    picture of one says which."""
+    names = [name for name, (_, alone, _) in FIGURES.items() if len(runs) == 1 or not alone]  # each run has its own, too
+    prefix = f"{runs[0].folder.name}: " if among > 1 and len(runs) == 1 else ""
+    found, left_out = drawn(runs, alive, names, prefix)
+    if len(runs) == 1 and not alive.views:  # which move by themselves
         content = io.BytesIO()
         try:
             animate(runs[0], content)
-            found.insert(1, picture(content.getvalue(), "image/gif", "animation", ANIMATION))
+            found.insert(1, picture(content.getvalue(), "image/gif", "animation", prefix + ANIMATION))
         except Missing:
             pass
     words = f'<details><summary>pictures that are left out</summary><ul>{"".join(f"<li>{text(w)}</li>" for w in left_out)}</ul></details>'
@@ -63,7 +82,8 @@ def facts(run):
     found = {}
     if modes.get("modes"):
         first = modes["modes"][0]
-        found["unstable modes"] = f"{modes['unstable_count']} of {len(modes['modes'])} below {modes['band_hz'] / 1000:g} kHz"
+        size, unit = frequency_unit(modes["band_hz"])
+        found["unstable modes"] = f"{modes['unstable_count']} of {len(modes['modes'])} below {modes['band_hz'] / size:g} {unit}"
         if first["unstable"]:
             found["fastest growing mode"] = f"{first['frequency_hz']:.5g} Hz, {first['growth_rate']:+.3g} 1/s"
     if cycle.get("outcome") == "converged":
@@ -73,8 +93,7 @@ def facts(run):
             name, swing = max(swings.items(), key=lambda item: item[1])
             size, unit = length_unit(np.array([swing]))
             found[f"swing of {name}"] = f"{swing / size:.3g} {unit} peak to peak"
-        if report["model"]["pairs"]:
-            found["contact lost"] = f"{100 * cycle['open_pairs_max'] / report['model']['pairs']:.3g} % of the pairs at most"
+        found |= lost_contact(run)
         stability = cycle.get("multipliers", {}).get("stability")
         if (run.folder / "sound.txt").exists():
             found["sound"] = (run.folder / "sound.txt").read_text().partition(",")[0] + " at the microphone"
@@ -87,6 +106,16 @@ def facts(run):
     return found | study_facts(report)
 
 
+def lost_contact(run):
+    """By area, as the picture of it."""
+    try:
+        _, opened, _, area = lift_off_of(run)
+    except Missing:
+        return {}
+    of = "area" if area != len(run.field("pairs/node")) else "pairs"
+    return {"contact lost": f"{100 * opened.max():.3g} % of the {of} at most"}
+
+
 def study_facts(report):
     """The same of sensitivity, sweep and random numbers."""
     found = {}
@@ -94,11 +123,11 @@ def study_facts(report):
     shown = strongest(causes[0]["derivatives"])[0] if causes else []
     if shown and shown[0]["value"]:
         effect = 0.01 * shown[0]["value"] * shown[0]["growth_rate_by"]
-        found["what moves that mode most"] = f"{shown[0]['key']}: {effect:+.3g} 1/s for 1 %"
+        found["what moves that mode most"] = f"{words_of(shown[0]['key'], shown[0]['name'])}: {effect:+.3g} 1/s for 1 %"
     sweep = report.get("sweep", {})
     if sweep.get("points"):
         failed = sum(p["outcome"] != "converged" and not p["inserted"] for p in sweep["points"])
-        name = f"sweep of {' and '.join(sweep['keys'])}"
+        name = f"sweep of {' and '.join(map(words_of, sweep['keys'], sweep['names']))}"
         found[name] = f"unstable at {sum(p['unstable_modes'] > 0 for p in sweep['points'])} of {len(sweep['points'])} points"
         found[name] += f", {failed} failed" if failed else ""
         rising = [t for t in sweep["thresholds"] if t["change"] > 0]
@@ -118,10 +147,12 @@ def answers(runs):
         cards = "".join(f"<div><dt>{text(name)}</dt><dd>{text(value)}</dd></div>" for name, value in facts(run).items())
         return f'<p class="heard">{text(heard[0].upper() + heard[1:])}.</p><dl class="cards">{cards}</dl>'
     found = [facts(run) for run in runs]
-    names = list(dict.fromkeys(name for entry in found for name in entry))
-    rows = [[f"<b>{text(run.folder.name)}</b>", text(run.report.get("heard", "")), *(text(entry.get(name, "–")) for name in names)]
-            for run, entry in zip(runs, found)]
-    return table(["run", "heard", *map(text, names)], rows)
+    heads = [text(run.folder.name) for run in runs]
+    differ = differences(runs)
+    first = table(["", *heads], differ, "further differences") if differ else paragraph("The scenes of these runs are alike.")
+    rows = [["heard", *(text(run.report.get("heard", "")) for run in runs)]]
+    rows += [[text(name), *(text(entry.get(name, "–")) for entry in found)] for name in dict.fromkeys(name for entry in found for name in entry)]
+    return f"<h2>What differs</h2>{first}<h2>What comes of it</h2>{table(['', *heads], rows, 'further answers')}"
 
 
 def warnings(run):
@@ -167,19 +198,21 @@ def again(run):
 
 
 def page(runs):
-    title = runs[0].title if len(runs) == 1 else f"{runs[0].title}: {len(runs)} runs"
+    title = runs[0].title if len(runs) == 1 else f"{names_of(runs)}: {len(runs)} runs"
+    alive = Alive(runs)
     parts = [f"<header><p>squeal</p><h1>{text(title)}</h1></header>", f'<section class="answers">{answers(runs)}</section>']
     if len(runs) > 1:
-        parts.append(f'<section><h2>Side by side</h2><div class="pictures">{pictures(runs)}</div></section>')
+        parts += [alive.stage(), f'<section><h2>Side by side</h2><div class="pictures">{pictures(runs, alive)}</div></section>']
     for run in runs:
         if len(runs) > 1:
             parts.append(f"<h2 class='run'>{text(run.folder.name)}: {text(run.report.get('heard', ''))}</h2>")
-        parts += [warnings(run), f'<section><h2>Pictures</h2><div class="pictures">{pictures([run])}</div>{sound(run)}</section>',
+        shown = pictures([run], alive, len(runs))
+        parts += [warnings(run), alive.stage() if len(runs) == 1 else "", input_of(run),
+                  f'<section><h2>Pictures</h2><div class="pictures">{shown}</div>{sound(run)}</section>',
                   f"<section><h2>Numbers</h2>{numbers(run.report)}{stages(run)}{again(run)}</section>"]
     # The policy keeps a browser from asking the network for anything.
-    policy = "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-    script = "addEventListener('beforeprint', () => document.querySelectorAll('details.print').forEach(d => d.open = true))"
+    policy = "default-src 'none'; img-src data: blob:; media-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
     return (f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{text(title)}</title>'
             f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
             f'<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
-            f"<style>{STYLE}</style></head><body><main>{''.join(parts)}</main><script>{script}</script></body></html>\n")
+            f"<style>{STYLE}</style></head><body><main>{''.join(parts)}</main>{alive.scripts()}</body></html>\n")

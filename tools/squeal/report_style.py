@@ -24,7 +24,39 @@ dd { margin: 0; font-weight: 600; overflow-wrap: anywhere; }
   grid-auto-flow: dense; }
 figure { margin: 0; }
 figure.broad { grid-column: 1 / -1; }
-img { display: block; max-width: 100%; height: auto; margin: 0 auto; }
+img { display: block; max-width: 100%; height: auto; margin: 0 auto; cursor: zoom-in; }
+figure.large img { max-width: none; width: max(100%, 900px); cursor: zoom-out; }
+.charts { display: grid; grid-template-columns: repeat(var(--columns, 1), minmax(0, 1fr)); gap: 0.8rem; }
+.charts[hidden] { display: none; }
+.chart .head { display: flex; justify-content: space-between; align-items: baseline; gap: 0.5rem; font-size: 0.9rem; min-height: 1.6rem; }
+.chart .tools { margin-left: auto; white-space: nowrap; }
+.title { display: none; font-weight: 600; font-size: 0.95rem; }
+.key { display: flex; flex-wrap: wrap; gap: 0 0.9rem; justify-content: center; font-size: 0.85rem; color: var(--soft); }
+.plot { position: relative; min-height: 250px; width: 100%; touch-action: pan-y; }
+.plot canvas { position: absolute; inset: 0; }
+.plot .box { position: absolute; border: 1px solid var(--blue); background: rgba(27, 108, 168, 0.12); pointer-events: none; }
+button, select { font: inherit; font-size: 0.88rem; color: var(--ink); background: var(--paper); border: 1px solid var(--line);
+  border-radius: 4px; padding: 0.12rem 0.5rem; cursor: pointer; max-width: 100%; }
+button:hover { border-color: var(--blue); }
+#view { display: grid; grid-template-columns: minmax(0, 1fr) 300px; gap: 0.4rem 1.2rem; }
+#view .stage { grid-column: 1; min-height: 200px; }
+#view .stage canvas { display: block; cursor: grab; }
+#view .legend { grid-column: 1; display: flex; flex-wrap: wrap; gap: 0.3rem 0.9rem; align-items: center; justify-content: center;
+  font-size: 0.88rem; color: var(--soft); }
+#view .bar { width: 180px; height: 12px; border: 1px solid var(--line); }
+.chip { display: inline-block; width: 0.85em; height: 0.85em; margin-right: 0.35em; border: 1px solid #8a949e; vertical-align: -0.05em; }
+#view .controls { grid-column: 2; grid-row: 1 / 3; display: flex; flex-direction: column; gap: 0.6rem; font-size: 0.9rem; }
+#view .controls > label { display: flex; gap: 0.5rem; align-items: center; justify-content: space-between; }
+#view .controls > label[hidden] { display: none; }
+#view .controls select { min-width: 0; flex: 1; }
+#view .row, #view .sides { display: flex; flex-wrap: wrap; gap: 0.4rem 0.8rem; align-items: center; }
+#view .parts { border-top: 1px solid var(--line); border-bottom: 1px solid var(--line); padding: 0.4rem 0; max-height: 240px; overflow-y: auto; }
+#view .parts div { display: flex; justify-content: space-between; align-items: center; gap: 0.5rem; }
+#view .parts label { overflow-wrap: anywhere; }
+#view input[type="range"] { width: 110px; }
+#view .parts input[type="range"] { width: 84px; flex: none; }
+#view output { min-width: 4.6rem; }
+#view .words { margin: 0; color: var(--soft); }
 figcaption { color: var(--soft); font-size: 0.9rem; margin-top: 0.3rem; }
 audio { width: 100%; max-width: 480px; }
 .wide { overflow-x: auto; }
@@ -43,10 +75,14 @@ summary { cursor: pointer; color: var(--blue); }
   h1 { font-size: 1.3rem; }
   .heard { font-size: 1.08rem; }
   section { padding: 0.8rem; }
-  .pictures { grid-template-columns: minmax(0, 1fr); }
+  .pictures, .charts { grid-template-columns: minmax(0, 1fr); }
   figure.broad { grid-column: auto; }
-  figure img { max-width: none; width: 520px; }
-  figure.broad img { width: 760px; }
+  #view { grid-template-columns: minmax(0, 1fr); }
+  #view .controls { grid-column: 1; grid-row: auto; }
+}
+@media screen {
+  figure.live.started > .wide, .turns figure.turned { display: none; }
+  figure.started .title { display: block; }
 }
 @media print {
   @page { margin: 14mm; }
@@ -63,6 +99,6 @@ summary { cursor: pointer; color: var(--blue); }
   table { font-size: 8pt; }
   th, td { padding-right: 0.5rem; }
   td.words { min-width: 0; }
-  audio { display: none; }
+  audio, .charts, .stand, .still, .tools { display: none; }
 }
 """

@@ -61,7 +61,7 @@ def contacts(report):
     if not found:
         return ""
     rows = [[text(c["stator"]), text(c["rotor"]), number(c["normal_force_sum"]), number(c.get("torque"))] for c in found]
-    return "<h3>Contacts at rest</h3>" + table(["stator", "rotor", "normal force [N]", "braking torque [N m]"], rows)
+    return "<h3>Contacts in steady sliding</h3>" + table(["stator", "rotor", "normal force [N]", "braking torque [N m]"], rows)
 
 
 def cycle(report):

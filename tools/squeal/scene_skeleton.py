@@ -1,60 +1,131 @@
-"""The skeleton of a scene for a mesh_model.Model: what the deck says as keys, what it does not say as comments to fill in."""
+"""The scene of a mesh_model.Model. What a scene needs and the deck does not say is a key with the text FILL IN, which squeal
+refuses at its line."""
 
-from squeal.mesh_model import KINDS, MOTIONS
+from squeal.deck_joints import MOTIONS, Tables
+from squeal.mesh_model import KINDS
+
+# (power of the length unit, power of the force unit) of keys that have units; the time is in s
+UNITS = {"at": (1, 0), "mass": (-1, 1), "inertia": (1, 1), "stiffness": (-1, 1), "damping": (-1, 1), "vector": (0, 1),
+         "moment": (1, 1), "value": (-2, 1), "tension": (0, 1), "velocity": (1, 0), "centre": (1, 0), "compliance": (3, -1),
+         "slip_compliance": (3, -1), "young": (-2, 1), "shear": (-2, 1), "density": (-4, 1), "area": (2, 0), "bending": (4, 0),
+         "torsion": (4, 0), "diameter": (1, 0), "thickness": (1, 0), "displacement": (1, 0), "decay_speed": (1, 0),
+         "reach": (1, 0), "gap": (1, 0), "gravity": (1, 0)}
+TURNING = ("stiffness", "damping")  # whose last three of six have the length twice more
 
 
 def text(value):
     return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
+class Writer:
+    """Tables as lines, with their units."""
+
+    def __init__(self, length, force):
+        self.length, self.force, self.lines = length, force, []
+
+    def value(self, key, given):
+        if isinstance(given, str):
+            return text(given)
+        if isinstance(given, dict):
+            return "{ " + ", ".join(f"{name} = {self.value(name, of)}" for name, of in given.items()) + " }"
+        powers = UNITS.get(key, (0, 0))
+        factor = self.length ** powers[0] * self.force ** powers[1]
+        if key == "factor_at_speed":
+            return "[" + ", ".join(f"[{speed * self.length:.14g}, {of:.14g}]" for speed, of in given) + "]"
+        if isinstance(given, (list, tuple)):
+            if given and isinstance(given[0], str):
+                return text(given[0]) if len(given) == 1 else "[" + ", ".join(map(text, given)) + "]"
+            factors = [factor * (self.length**2 if key in TURNING and len(given) == 6 and i > 2 else 1) for i in range(len(given))]
+            return "[" + ", ".join(f"{v * f:.14g}" for v, f in zip(given, factors)) + "]"
+        return f"{given * factor:.14g}"
+
+    def table(self, name, keys):
+        self.lines += ["", f"[[{name}]]" if name not in ("friction", "modes", "damping", "mesh") else f"[{name}]"]
+        self.lines += [f"{key} = {self.value(key, given)}" for key, given in keys.items()]
+
+
 def skeleton(model, mesh, length, force):
-    lines = [f"# Made of {model.source.name}. Lines with FILL IN need a number or a name, and lose their first #.",
-             f"title = {text(model.source.stem)}", "", "[mesh]", f"file = {text(mesh)}"]
-    lines += [f"scale = {length!r}"] if length != 1 else ["# Of a deck in mm, N and s? Make this again by tools/mesh … --length 0.001 --force 1, which converts moduli too."]
+    tables = Tables(model)
+    made = tables.make()  # which may add notes and groups
+    writer = Writer(length, force)
+    writer.lines = [f"# Made of {model.source.name}. squeal refuses lines with FILL IN: the deck does not say what they need.",
+                    f"title = {text(model.source.stem)}"]
+    if model.gravity is not None:
+        writer.lines.append(f"gravity = {writer.value('gravity', model.gravity)}")
+    writer.lines += ["", "[mesh]", f"file = {text(mesh)}"]
+    writer.lines += [f"scale = {length!r}"] if length != 1 else [
+        "# Of a deck in mm, N and s? Make this again by tools/mesh … --length 0.001 --force 1, which converts moduli too."]
     for note in model.notes:
-        lines += ["", f"# Not taken over: {note}"] if note == model.notes[0] else [f"# Not taken over: {note}"]
+        writer.lines += ["", f"# Not taken over: {note}"] if note == model.notes[0] else [f"# Not taken over: {note}"]
+    groups = [*model.surfaces, *model.node_sets]
+    writer.lines += ["", "# Groups of the mesh: " + (", ".join(groups) or "none beside the parts")]
     for name, part in model.parts.items():
-        lines += ["", "[[part]]", f"name = {text(name)}", *material(model, part, length, force)]
-        if model.elements[part.elements[0]][0] not in KINDS:
-            lines.append(f"thickness = {part.thickness * length:.12g}" if part.thickness else
-                         "# thickness =    # FILL IN [m]: these are shells; or remove this part, if they are the surface of a solid")
-    for name, motions in model.supports:
-        fixed = "all" if len(motions) == len(MOTIONS) else " ".join(motions)
-        lines += ["", "[[support]]", f"on = {text(name)}", f"fixed = {text(fixed)}"]
-    if not model.supports:
-        lines += ["", "# [[support]]", f"# on = \"\"          # FILL IN: {names_of(model)}", '# fixed = "all"']
-    lines += ["", *contacts(model), "", "[damping]", "# beta = 1e-7     # FILL IN [s]: C = alpha M + beta K"]
-    if any(line.startswith("loss_factor = ") for line in lines):
-        lines.append("# loss_frequency =    # FILL IN [Hz]: where loss factors have their viscous equivalent in time")
-    lines.append("")
-    lines += ["# [[force]]", f"# on = \"\"          # FILL IN: {names_of(model)}", "# vector = [0, 0, 0]   # FILL IN [N]: the whole force", ""]
-    return "\n".join(lines)
-
-
-def material(model, part, length, force):
-    """Stress is force over length squared, density force s2 over length to the fourth."""
-    known = model.materials.get(part.material, {}) if part.material else {}
-    lines = []
-    for key, unit, factor in (("young", "Pa", force / length**2), ("poisson", "-", 1), ("density", "kg/m3", force / length**4)):
-        missing = key not in known or (known[key] == 0 and key != "poisson")
-        lines.append(f"# {key} =    # FILL IN [{unit}]: the deck has none" if missing else f"{key} = {known[key] * factor:.12g}")
-    damping = {**known, "loss_factor": known.get("loss_factor", 0) + model.loss_factor}
-    return lines + [f"{key} = {damping[key]:.12g}" for key in ("loss_factor", "alpha", "beta") if damping.get(key)]
-
-
-def names_of(model):
-    names = [*model.surfaces, *model.node_sets]
-    return "a named group: " + ", ".join(names) if names else "a named group; the deck has no sets or surfaces"
-
-
-def contacts(model):
-    lines = []
+        writer.table("part", {"name": name, **material(model, part)})
+    for table, keys in made:
+        if table not in ("force", "bolt"):
+            writer.table(table, keys)
+    write_groups(model, writer)
+    write_loads(model, made, tables.names, writer)
     for slave, master in model.ties:
-        lines += ["[[tie]]", f"slave = {text(slave)}", f"master = {text(master)}", ""]
-    pairs = model.contacts or [("", "")]
-    for slave, master in pairs:
-        found = f"the deck has a contact of {slave} (slave) and {master} (master)" if slave else "the surface that moves: " + (
-            ", ".join(model.surfaces) or "the deck has no surfaces; name faces or sets of nodes in it")
-        lines += ["# [[contact]]", f"# rotor = {text(master)}    # FILL IN: {found}", f"# stator = {text(slave)}    # FILL IN",
-                  '# rotation = { axis = "z", centre = [0, 0, 0], rate = 0 }    # FILL IN [rad/s]; or velocity = [0, 0, 0] [m/s]']
-    return [*lines, "", "[friction]", "# coefficient = 0.3    # FILL IN [-]"]
+        writer.table("tie", {"slave": slave, "master": master})
+    for slave, master, keys in model.contacts:
+        driven = "rotation" in keys or "velocity" in keys
+        rotor = {"rotor": slave, "stator": master, "slave": "rotor"} if keys.get("slave") == "rotor" else {
+            "rotor": master, "stator": slave}
+        writer.table("contact", {**rotor, **{key: of for key, of in keys.items() if key != "slave"}})
+        if not driven:
+            writer.lines.append("# without rotation and velocity it sticks or slips by itself")
+    if any(line.startswith("loss_factor = ") for line in writer.lines):
+        writer.table("damping", {"loss_frequency": "FILL IN [Hz]: where loss factors have their viscous equivalent in time"})
+    if model.band:
+        writer.table("modes", {"band": model.band})
+    return "\n".join([*writer.lines, ""])
+
+
+def write_groups(model, writer):
+    for name, motions, keys in model.supports:
+        fixed = "all" if len(motions) == len(MOTIONS) else " ".join(motions)
+        writer.table("support", {"on": name, "fixed": fixed, **keys})
+    for name, mass in model.masses:
+        writer.table("mass", {"on": name, "mass": mass})
+
+
+def write_loads(model, made, names, writer):
+    """Forces, pressures and bolts, and the steps, whose factors are in the order of the loads."""
+    node_of = {name: node for node, name in names.items()}
+    forces = [(("force", node_of[keys["on"]]), keys) for table, keys in made if table == "force"]
+    forces += [(("group", i), {"on": name, **keys}) for i, (name, keys) in enumerate(model.forces)]
+    for _, keys in forces:
+        writer.table("force", keys)
+    for name, keys in model.pressures:
+        writer.table("pressure", {"on": name, **keys})
+    bolts = [keys for table, keys in made if table == "bolt"] + [{"section": name, **keys} for name, keys in model.bolts]
+    for keys in bolts:
+        writer.table("bolt", {"name": keys["name"], **keys})
+    known = {keys["name"] for keys in bolts}
+    for name, factors, friction, tightened in model.steps:
+        keys = {"name": name}
+        of_forces = [factors.get(key, 1.0) for key, _ in forces]
+        of_pressures = [factors.get(("pressure", i), 1.0) for i in range(len(model.pressures))]
+        keys |= {"forces": of_forces} if any(factor != 1 for factor in of_forces) else {}
+        keys |= {"pressures": of_pressures} if any(factor != 1 for factor in of_pressures) else {}
+        keys |= {"friction": friction} if friction != 1 else {}
+        keys |= {"bolts": [bolt for bolt in tightened if bolt in known]} if known & set(tightened) else {}
+        writer.table("step", keys)
+
+
+def material(model, part):
+    known = model.materials.get(part.material, {}) if part.material else {}
+    keys = {}
+    if "orthotropic" in known:
+        keys["orthotropic"] = {**known["orthotropic"], **(part.axes or {})}
+    else:
+        for key, unit in (("young", "Pa"), ("poisson", "-")):
+            missing = key not in known or (known[key] == 0 and key != "poisson")
+            keys[key] = f"FILL IN [{unit}]: the deck has none" if missing else known[key]
+    keys["density"] = known["density"] if known.get("density") else "FILL IN [kg/m3]: the deck has none"
+    damping = {**known, "loss_factor": known.get("loss_factor", 0) + model.loss_factor}
+    keys |= {key: damping[key] for key in ("loss_factor", "alpha", "beta") if damping.get(key)}
+    if model.elements[part.elements[0]][0] not in KINDS:
+        keys["thickness"] = part.thickness or "FILL IN [m]: these are shells; or remove this part, if they are the surface of a solid"
+    return keys

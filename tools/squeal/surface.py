@@ -43,16 +43,43 @@ def _rim(code, nodes):
         yield rim
 
 
-def faces(topology):
-    """Faces of the outer surface, each as the nodes round it: those of one solid only, outward; and shells."""
+def outer(elements):
+    """Faces of the outer surface of these elements, each as the nodes round it: those of one solid only, outward; and shells."""
     shells, met = [], {}
-    for code, nodes in elements(topology):
+    for code, nodes in elements:
         if code in SHELLS:
             shells.append(nodes)
             continue
         for rim in _rim(code, nodes):
             met.setdefault(frozenset(rim), []).append(rim)
     return [twins[0] for twins in met.values() if len(twins) == 1], shells
+
+
+def faces(topology):
+    """Those of the whole mesh."""
+    return outer(elements(topology))
+
+
+def by_part(topology, part):
+    """Elements of each part, by its index. part: that of every element, points included, which have -1."""
+    found = {}
+    for number, element in zip(part[part >= 0].tolist(), elements(topology)):
+        found.setdefault(number, []).append(element)
+    return found
+
+
+def volume(elements, nodes, thickness):
+    """Of solids, by the cones from one of their corners to their faces, and of shells of this thickness [m3]."""
+    total = 0.0
+    for code, of in elements:
+        if code in SHELLS:
+            a, b, c = np.moveaxis(triangles(nodes[of]), 1, 0)
+            total += thickness * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+            continue
+        for rim in _rim(code, of):
+            a, b, c = np.moveaxis(triangles(nodes[rim] - nodes[of[0]]), 1, 0)
+            total += (a * np.cross(b, c)).sum() / 6
+    return total
 
 
 def triangles(polygon):

@@ -31,10 +31,6 @@ struct ReachedMotion
   std::vector<std::size_t> starts; // numbers of the starts that lead to it
 };
 
-/// Means of successive windows of so many samples, a broken number: over the mode's period a cycle of another one
-/// beats.
-std::vector<double> means_over(const std::vector<double>& samples, double length);
-
 /// [Hz] Of upward zero crossings [s], from their second half, with a bar; zero where they are too few.
 MeanValue frequency_of(const std::vector<double>& crossings);
 

@@ -13,6 +13,8 @@ struct ReducedSpectrum
   std::vector<std::complex<double>> values; // largest first, complex pairs whole
   Eigen::MatrixXd right, left;              // orthonormal bases of the right and left vectors' spans, (q, v)
   Eigen::MatrixXd columns;                  // of the monodromy matrix, along the slow coordinates of q and of v
+  std::vector<std::complex<double>> known;  // all values above 1/2, of which `values` are the first
+  Eigen::MatrixXd known_right, known_left;  // bases of their vectors' spans; left ones along the slow coordinates
 };
 
 /// Which multipliers are wanted.
@@ -37,6 +39,10 @@ ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<cons
 /// model.
 SlowMotions slow_motions_of(const ReducedSpectrum& spectrum, const ReducedModel& model,
                             const ReducedCoordinates& coordinates, Vec pattern);
+
+/// Takes from a motion its part along the vectors of all values above 1/2: x - R (L'R)^-1 L'x.
+std::function<void(Vec motion)> taking_out_known(const ReducedSpectrum& spectrum,
+                                                 const ReducedCoordinates& coordinates);
 
 /// Adds to the errors and rises of the slow motions a part of what the moduli change by: `others` are the values on
 /// another grid of time.

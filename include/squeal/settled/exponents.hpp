@@ -1,7 +1,7 @@
 #pragma once
 /// The largest Lyapunov exponents of a flow along a motion, from its batched tangent (src/README.md, section 7.10). A
-/// few columns are carried along and made orthonormal again in the energy product after every period. The logarithms of
-/// what they were stretched by are the exponents, per period. Functions that take a flow are collective.
+/// few columns are carried along and made orthonormal again in the energy product after every window of time. The
+/// logarithms of what they were stretched by are the exponents. Functions that take a flow are collective.
 #include "squeal/settled/statistics.hpp"
 #include "squeal/shooting/flow.hpp"
 
@@ -14,18 +14,18 @@ namespace squeal
 struct TangentBundle
 {
   std::vector<Owned<Vec>> columns;         // energy-orthonormal
-  std::vector<std::vector<double>> growth; // [column][period] logarithm of its stretching
+  std::vector<std::vector<double>> growth; // [column][window] logarithm of its stretching
 };
 
 /// `count` columns in no special direction.
 TangentBundle make_bundle(const Flow& flow, Vec like, PetscInt count);
 
-/// Carries the columns along the period that the flow recorded last.
+/// Carries the columns along the window that the flow recorded last.
 void follow_period(const Flow& flow, TangentBundle& bundle);
 
-/// Largest first, per period, from the periods after the first `skipped`. A column that shears without growing, as on
-/// a torus, is stretched in proportion to the time. That is ln 2 over the last half of the periods, which the bars
+/// Largest first, per so many windows, from those after the first `skipped`. A column that shears without growing, as
+/// on a torus, is stretched in proportion to the time. That is ln 2 over the last half of the windows, which the bars
 /// include. Not collective.
-std::vector<MeanValue> exponents_of(const TangentBundle& bundle, std::size_t skipped);
+std::vector<MeanValue> exponents_of(const TangentBundle& bundle, std::size_t skipped, double windows);
 
 } // namespace squeal

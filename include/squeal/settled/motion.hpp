@@ -26,7 +26,7 @@ template <> inline constexpr std::array words_of<MotionKind> = {"undecided", "pe
 /// Options -settled_...
 struct SettledOptions
 {
-  PetscInt periods = 0;   // integrated at most; 0: 2048, and 512 where they are dear
+  PetscInt periods = 0;   // windows integrated at most; 0: 2048, and 512 where they are dear
   PetscInt exponents = 4; // Lyapunov exponents
   PetscInt shapes = 100;  // at most, that the motion is kept on
 };
@@ -38,22 +38,30 @@ struct MotionVerdict
   std::string between, would_decide; // of an undecided one, in words
 };
 
-/// What is seen of one period.
-struct PeriodSample
+/// What is seen of a motion at equal steps.
+struct MotionSeries
 {
-  std::vector<double> means;      // of each channel; the first is the energy that stationarity is judged by
-  std::vector<double> coordinate; // of the spectrum, at equal steps
-  std::vector<double> beside;     // another, where a second frequency is sought that the first does not see; or empty
+  std::vector<std::vector<double>> averaged; // whose means over periods count; by the first stationarity is judged
+  std::vector<std::vector<double>> moving;   // whose swings within periods count; the largest has the spectrum
+  std::vector<double> beside; // its spectrum where nothing moves; shows a second frequency else, or empty
 };
 
-/// Integrates one period in place, such that the flow's tangent then belongs to it.
-using PeriodSampler = std::function<PeriodSample(Vec state)>;
+/// A motion that is integrated window by window: its flow's tangent belongs to the window before.
+struct ObservedMotion
+{
+  double window;                            // [s]
+  std::function<double(Vec state)> advance; // in place, by one window; the mean there of what is averaged first
+  std::function<MotionSeries()> series;     // from the start
+};
 
-/// A motion, what is measured on it and its kind.
+/// A motion, what is measured on it and its kind. Its period is that of its strongest line, or the multiple after which
+/// it closes: a window may be any length, as where a search ended.
 struct ExaminedMotion
 {
-  std::vector<std::vector<double>> channels; // [channel][period], from the start
-  std::vector<double> coordinate, beside;    // all samples
+  std::size_t windows = 0;                   // integrated
+  double period = 0;                         // [s]
+  std::vector<std::vector<double>> channels; // [channel][period], from the start: means, then swings
+  int followed = -1;                         // which of what moves the spectrum is of; -1: what is beside it
   std::size_t discarded = 0;                 // periods before the motion was stationary; all of them if it never was
   std::vector<MeanValue> means;              // of each channel, from the periods after those
   std::vector<MeanValue> exponents;          // per period, largest first
@@ -68,9 +76,9 @@ struct ExaminedMotion
 MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<const double> energies,
                            const BaseFrequencies& base);
 
-/// Integrates 128 periods, and twice as many until the kind is decided or the options' number is reached. The state
+/// Integrates 128 windows, and twice as many until the kind is decided or the options' number is reached. The state
 /// goes along. Collective.
-ExaminedMotion examine_motion(const Flow& flow, const PeriodSampler& sampler, Vec state, double period,
+ExaminedMotion examine_motion(const Flow& flow, const ObservedMotion& observed, Vec state,
                               const SettledOptions& options);
 
 } // namespace squeal

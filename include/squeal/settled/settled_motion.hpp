@@ -12,10 +12,8 @@ namespace squeal
 struct SettledMotion
 {
   Outcome outcome;
-  int steps_per_period = 0;
-  double period = 0; // [s] of the windows that are called periods here
+  int steps_per_period = 0; // the nearest number
   ExaminedMotion examined;
-  int spectrum_probe = -1;              // whose spectrum it is: the one that swings most [m]; -1: the normal force [N]
   MeanValue fluctuating_energy, energy; // [J]
   double step_error = 0; // [J] what the mean of the fluctuating energy changes by with half as many steps a period
   double least_energy = 0, greatest_energy = 0;       // [J] of the means of the fluctuating energy over single periods
@@ -23,8 +21,8 @@ struct SettledMotion
   MeanValue open_fraction, stick_fraction, slip_fraction;
   std::vector<MeanValue> peak_to_peak; // [m] within a period, of each probe
   State end;                           // of the last period
-  History history;                     // of all periods
-  MotionShapes shapes;                 // of all periods, the strongest of those that were stationary
+  History history;                     // of all windows
+  MotionShapes shapes;                 // of all windows, the strongest of those that were stationary
   int sampled_steps = 1;               // between two samples of the shapes
 };
 

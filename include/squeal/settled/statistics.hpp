@@ -3,6 +3,7 @@
 /// one rank; no function throws.
 #include <cstddef>
 #include <span>
+#include <vector>
 
 namespace squeal
 {
@@ -12,6 +13,9 @@ struct MeanValue
 {
   double value = 0, error = 0;
 };
+
+/// Means of successive windows of so many samples, a broken number: over another period than its own a cycle beats.
+std::vector<double> means_over(const std::vector<double>& samples, double length);
 
 /// The mean, its bar by means of 8, 16 and 32 batches: the widest of the three. Neighbouring values may depend on each
 /// other over less than a batch. Of fewer than 16 values 4 batches; of fewer than 4 no bar (NaN).

@@ -15,14 +15,17 @@ namespace squeal
 {
 
 /// Approximations of the largest multipliers of dPhi_T/dx and spans of eigenvectors (src/README.md, section 6.9). All
-/// lists are of one size but `others`.
+/// lists are of one size.
 struct SlowMotions
 {
   std::vector<std::complex<double>> values; // largest first
   std::vector<double> errors;               // what a modulus changes by with the grid of time
   std::vector<double> rises;                // what it rises by at most
   std::vector<Owned<Vec>> right, left;      // of the spans; left ones act by the energy product
-  std::vector<Owned<Vec>> others;           // more motions that decay slowly, the slowest first
+  double next = 0;                          // the largest modulus beside these
+  /// Takes from a motion its part along every motion of the approximation that loses less than half in a period. Empty:
+  /// the approximation is exact.
+  std::function<void(Vec motion)> without_known;
   /// x = (A - m)^-1 x of a complex x, A that approximation of dPhi_T/dx.
   std::function<void(std::complex<double> m, Vec real, Vec imaginary)> correct;
   std::function<bool()> confirmed; // whether another approximation has as many large values

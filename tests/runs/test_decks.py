@@ -1,0 +1,410 @@
+"""tools/mesh: what decks say beside their mesh becomes tables of a scene that runs without an edit."""
+
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+from conftest import load_tool
+
+TOOL = load_tool("mesh")
+# two bricks of edge 1 above each other, which share no node: the upper one slides on the lower one
+AT = [(x, y, z) for z in (0, 1, 1, 2) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+NODES = "*NODE\n" + "".join(f"{i}, {x}, {y}, {z}\n" for i, (x, y, z) in enumerate(AT, 1))
+BRICKS = NODES + (
+    "100, 0.5, 0.5, 3\n101, 0.5, 0.5, 5\n*ELEMENT, TYPE=C3D8, ELSET=low\n1, 1,2,3,4,5,6,7,8\n"
+    "*ELEMENT, TYPE=C3D8, ELSET=high\n2, 9,10,11,12,13,14,15,16\n*SURFACE, NAME=low_top\nlow, S2\n*SURFACE, NAME=high_bottom\nhigh, S1\n"
+    "*SURFACE, NAME=high_top\nhigh, S2\n*NSET, NSET=base\n1,2,3,4\n*NSET, NSET=all_low, ELSET=low\n*MATERIAL, NAME=m\n*ELASTIC\n2e11, 0.25\n"
+    "*DENSITY\n7800\n*SOLID SECTION, ELSET=low, MATERIAL=m\n*SOLID SECTION, ELSET=high, MATERIAL=m\n*BOUNDARY\nbase, 1, 3\n")
+GRIDS = "".join(f"GRID,{i},,{x}.,{y}.,{z}.\n" for i, (x, y, z) in enumerate(AT, 1)) + (
+    "GRID,100,,.5,.5,3.\nGRID,101,,.5,.5,5.\nCHEXA,1,1,1,2,3,4,5,6\n,7,8\nCHEXA,2,2,9,10,11,12,13,14\n,15,16\nPSOLID,1,1\nPSOLID,2,1\n"
+    "MAT1,1,2.+11,,.25,7800.\nSPC1,1,123,1,2,3,4\n")
+
+
+def converted(tmp_path, text, name="deck.inp", words=()):
+    """The scene of a deck, and what was left out."""
+    (tmp_path / name).write_text(text)
+    old = sys.argv
+    sys.argv = ["mesh", str(tmp_path / name), str(tmp_path / "out"), *words]
+    (tmp_path / "out" / "scene.toml").unlink(missing_ok=True)
+    try:
+        TOOL.main()
+    finally:
+        sys.argv = old
+    written = (tmp_path / "out" / "scene.toml").read_text()
+    return tomllib.loads(written), [line[18:] for line in written.splitlines() if line.startswith("# Not taken over: ")]
+
+
+def test_couplings_masses_and_loads_of_reference_nodes(tmp_path, squeal):
+    """In mm, N and t: a rigid coupling with a mass, a spring to the ground and a force, held but along z."""
+    scene, left_out = converted(tmp_path, BRICKS + (
+        "*NSET, NSET=hand\n100\n*COUPLING, CONSTRAINT NAME=grip, REF NODE=hand, SURFACE=HIGH_TOP\n*KINEMATIC\n1, 6\n"
+        "*ELEMENT, TYPE=MASS, ELSET=lump\n50, 100\n*MASS, ELSET=lump\n3\n*ELEMENT, TYPE=SPRING1, ELSET=soft\n51, 100\n"
+        "*SPRING, ELSET=soft\n3\n2e6\n*BOUNDARY\nhand, 1, 2\nhand, 4, 6\n*STEP\n*STATIC\n*CLOAD\nhand, 3, -7\n*END STEP\n"), words=("--length", "0.001"))
+    assert left_out == []
+    assert scene["rigid_body"] == [{"name": "grip", "surfaces": "high_top", "at": [0.0005, 0.0005, 0.003], "mass": 3000, "free": "z"}]
+    assert scene["spring"] == [{"from": "grip", "direction": "z", "stiffness": 2e9}]
+    assert scene["force"] == [{"on": "grip", "vector": [0, 0, -7]}]
+    assert scene["support"] == [{"on": "base", "fixed": "x y z"}]
+    assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
+
+
+@pytest.mark.parametrize("text, table, expected", [
+    ("*COUPLING, REF NODE=100, SURFACE=high_top, CONSTRAINT NAME=c\n*DISTRIBUTING\n1, 3\n*CLOAD\n100, 6, 4\n", "coupling",
+     [{"name": "c", "on": "high_top", "at": [0.5, 0.5, 3]}]),
+    ("*COUPLING, REF NODE=100, SURFACE=high_top, CONSTRAINT NAME=c\n*KINEMATIC\n1, 2\n", "rigid_body",
+     [{"name": "c", "surfaces": "high_top", "at": [0.5, 0.5, 3], "free": "all", "motions": "x y"}]),
+    ("*NSET, NSET=lid\n13,14,15,16\n*MPC\nBEAM, lid, 100\n", "rigid_body",
+     [{"name": "node_100", "surfaces": "lid", "at": [0.5, 0.5, 3], "free": "all"}]),
+    ("*NSET, NSET=lid\n13,14,15,16\n*RIGID BODY, NSET=lid, REF NODE=100\n", "rigid_body",
+     [{"name": "node_100", "surfaces": "lid", "at": [0.5, 0.5, 3], "free": "all"}]),
+    ("*MPC\nBEAM, 101, 100\n", "connector", [{"from": "node_101", "to": "node_100", "locked": "all"}]),
+    ("*NODE\n102, 0.5, 0.5, 3\n*EQUATION\n2\n100, 3, 1., 102, 3, -1.\n", "connector", [{"from": "node_100", "to": "node_102", "locked": "z"}]),
+    ("*ELEMENT, TYPE=SPRINGA, ELSET=s\n50, 13, 100\n*SPRING, ELSET=s\n\n5e6\n", "spring",
+     [{"from": "node_13", "to": "node_100", "direction": [0.5, 0.5, 1], "stiffness": 5e6}]),
+    ("*ELEMENT, TYPE=SPRING2, ELSET=s\n50, 101, 100\n*SPRING, ELSET=s\n5, 5\n8\n", "connector",
+     [{"from": "node_101", "to": "node_100", "stiffness": [0, 0, 0, 0, 8, 0]}]),
+    ("*ELEMENT, TYPE=DASHPOT1, ELSET=s\n50, 13\n*DASHPOT, ELSET=s\n2\n40\n", "spring", [{"from": "node_13", "direction": "y", "damping": 40}]),
+    ("*ELEMENT, TYPE=MASS, ELSET=s\n50, 13\n51, 14\n*MASS, ELSET=s\n0.5\n", "mass", [{"on": "s_masses", "mass": 1}]),
+    ("*ELEMENT, TYPE=B31, ELSET=pin\n50, 100, 101\n*BEAM SECTION, ELSET=pin, SECTION=CIRC, MATERIAL=m\n0.1\n0,1,0\n", "beam",
+     [{"name": "pin_50", "from": "node_100", "to": "node_101", "young": 2e11, "poisson": 0.25, "density": 7800, "diameter": 0.2, "elements": 1}]),
+    ("*CLOAD\nbase, 2, 2.5\n", "force", [{"on": "base", "vector": [0, 10, 0]}]),
+    ("*DSLOAD\nhigh_top, P, 3e5\n", "pressure", [{"on": "high_top", "value": 3e5}]),
+    ("*DLOAD\nhigh, P2, 3e5\n", "pressure", [{"on": "high_P2", "value": 3e5}]),
+    ("*TRANSFORM, NSET=base, TYPE=C\n0.5,0.5,0, 0.5,0.5,1\n", "support",
+     [{"on": "base", "fixed": "x y z"}]),
+    ("*NSET, NSET=rim\n13,14,15,16\n*TRANSFORM, NSET=rim, TYPE=C\n0.5,0.5,0, 0.5,0.5,1\n*BOUNDARY\nrim, 1\n", "support",
+     [{"on": "base", "fixed": "x y z"}, {"on": "rim", "fixed": "x", "cylinder": {"axis": [0, 0, 1], "centre": [0.5, 0.5, 0]}}]),
+    ("*BOUNDARY\n100, 1, 6\n100, 3, 3, 0.002\n*COUPLING, REF NODE=100, SURFACE=high_top\n*KINEMATIC\n", "support",
+     [{"on": "node_100", "fixed": "z", "displacement": [0, 0, 0.002], "rotation": [0, 0, 0]}, {"on": "base", "fixed": "x y z"}]),
+])
+def test_keywords_of_an_input_deck(tmp_path, text, table, expected):
+    scene, left_out = converted(tmp_path, BRICKS + text)
+    assert scene[table] == expected and left_out == []
+
+
+def test_gravity_and_axes_of_materials(tmp_path):
+    axes = "*ORIENTATION, NAME=o, SYSTEM=CYLINDRICAL\n0,0,0, 0,0,1\n*MATERIAL, NAME=n\n*ELASTIC, TYPE=ENGINEERING CONSTANTS\n"
+    axes += "5e9,4e9,3e9,.1,.2,.3,2e9,1e9,\n3e9\n*DENSITY\n2500\n*SOLID SECTION, ELSET=high, MATERIAL=n, ORIENTATION=o\n"
+    scene, left_out = converted(tmp_path, BRICKS + axes + "*ELSET, ELSET=both\nlow, high\n*DLOAD\nboth, GRAV, 9.81, 0, 0, -2\n")
+    assert scene["gravity"] == [0, 0, -9.81] and left_out == []
+    assert scene["part"][1] == {"name": "high", "density": 2500, "orthotropic": {
+        "young": [5e9, 4e9, 3e9], "poisson": [0.1, 0.2, 0.3], "shear": [2e9, 1e9, 3e9], "cylinder": {"axis": [0, 0, 1], "centre": [0, 0, 0]}}}
+
+
+RUBBING = ("*SURFACE INTERACTION, NAME=rub\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1e12\n*FRICTION\n0.\n"
+           "*CONTACT PAIR, INTERACTION=rub\nhigh_bottom, low_top\n")
+
+
+def test_steps_friction_and_motion(tmp_path, squeal):
+    """Pressure in two steps at rest, then rotation with friction, then modes: the last step's values, and factors of the others."""
+    scene, left_out = converted(tmp_path, BRICKS + RUBBING + (
+        "*STEP, NAME=touch\n*STATIC\n*DSLOAD\nhigh_top, P, 1e5\n*END STEP\n*STEP, NAME=press\n*STATIC\n*DSLOAD\nhigh_top, P, 4e5\n*END STEP\n"
+        "*STEP, NAME=turn\n*STATIC\n*MOTION, ROTATION, TYPE=VELOCITY\nall_low, 20., 0,0,0, 0,0,1\n*CHANGE FRICTION, INTERACTION=rub\n"
+        "*FRICTION, EXPONENTIAL DECAY\n0.5, 0.4, 2.\n*END STEP\n*STEP\n*FREQUENCY\n20, , 9000.\n*END STEP\n"
+        "*STEP\n*COMPLEX FREQUENCY\n20, , 8000.\n*END STEP\n*BOUNDARY\nhigh_top, 1, 2\n*NSET, NSET=high_top\n13,14,15,16\n"))
+    assert left_out == [] and scene["modes"] == {"band": 8000}
+    assert scene["contact"] == [{"rotor": "low_top", "stator": "high_bottom", "friction": 0.4, "compliance": 1e-12,
+                                 "static_coefficient": 0.5, "decay_speed": 0.5,
+                                 "rotation": {"axis": [0, 0, 1], "centre": [0, 0, 0], "rate": 20}}]
+    assert scene["pressure"] == [{"on": "high_top", "value": 4e5}]
+    assert scene["step"] == [{"name": "touch", "pressures": [0.25], "friction": 0}, {"name": "press", "friction": 0}, {"name": "turn"}]
+    assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
+
+
+def test_the_moving_side_is_the_rotor(tmp_path):
+    """Also where it is the slave; a contact of no moving side sticks or slips by itself."""
+    more = "*MOTION, TRANSLATION, TYPE=VELOCITY\nall_high, 2, 3.\n*NSET, NSET=all_high, ELSET=high\n"
+    scene, _ = converted(tmp_path, BRICKS + RUBBING + more)
+    assert scene["contact"] == [{"rotor": "high_bottom", "stator": "low_top", "slave": "rotor", "friction": 0, "compliance": 1e-12, "velocity": [0, 3, 0]}]
+    scene, _ = converted(tmp_path, BRICKS + RUBBING)
+    assert set(scene["contact"][0]) == {"rotor", "stator", "friction", "compliance"}
+
+
+def test_bolts(tmp_path, squeal):
+    """By a surface across a shank of two bricks, tightened in the first step and kept in the second."""
+    shank = NODES + (
+        "200, 0,0,4\n201, 1,0,4\n202, 1,1,4\n203, 0,1,4\n300, 0,0,0\n*ELEMENT, TYPE=C3D8, ELSET=bolt\n1, 9,10,11,12,13,14,15,16\n"
+        "2, 13,14,15,16,200,201,202,203\n*MATERIAL, NAME=m\n*ELASTIC\n2e11, 0.25\n*DENSITY\n7800\n*SOLID SECTION, ELSET=bolt, MATERIAL=m\n"
+        "*SURFACE, NAME=cut\n1, S2\n*NSET, NSET=ends\n9,10,11,12,200,201,202,203\n*BOUNDARY\nends, 1, 3\n"
+        "*PRE-TENSION SECTION, SURFACE=cut, NODE=300\n")
+    steps = "*STEP\n*STATIC\n*CLOAD\n300, 1, 5000.\n*END STEP\n*STEP\n*STATIC\n*BOUNDARY, FIXED\n300, 1, 1\n*END STEP\n"
+    scene, left_out = converted(tmp_path, shank + steps)
+    assert left_out == [] and "step" not in scene
+    assert scene["bolt"] == [{"name": "bolt_300", "section": "cut", "tension": 5000, "axis": [0, 0, -1]}]
+    assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
+
+
+def test_nodes_and_elements_that_keywords_make(tmp_path):
+    """A row of bricks by *NGEN, *NFILL, *ELGEN and *ELCOPY in a turned *SYSTEM, and a node in cylindrical coordinates."""
+    text = ("*SYSTEM\n10,0,0, 10,1,0\n9,0,0\n*NODE\n1, 0,0,0\n5, 4,0,0\n21, 0,1,0\n25, 4,1,0\n*NGEN, NSET=front\n1, 5\n*NGEN, NSET=back\n21, 25, 1\n"
+            "*NCOPY, CHANGE NUMBER=100, OLD SET=front, NEW SET=front_top, SHIFT\n0,0,1\n,\n*NCOPY, CHANGE NUMBER=100, OLD SET=back, NEW SET=back_top, SHIFT\n0,0,1\n,\n"
+            "*SYSTEM\n*NODE, SYSTEM=C\n500, 2, 90, 1\n*NODE\n600, 0,0,0\n602, 0,4,0\n*NSET, NSET=p\n600\n*NSET, NSET=q\n602\n*NFILL, NSET=mid\np, q, 2, 1\n"
+            "*ELEMENT, TYPE=C3D8\n1, 1,2,22,21, 101,102,122,121\n*ELGEN, ELSET=row\n1, 2, 1, 1\n*ELCOPY, OLD SET=row, NEW SET=more, SHIFT NODES=2, ELEMENT SHIFT=10\n")
+    (tmp_path / "deck.inp").write_text(text)
+    model = TOOL.read_deck(tmp_path / "deck.inp")
+    for number, at in {1: (10, 0, 0), 3: (10, 2, 0), 23: (9, 2, 0), 123: (9, 2, 1), 500: (0, 2, 1), 601: (0, 2, 0)}.items():
+        assert np.allclose(model.nodes[number], at, rtol=0, atol=1e-15), number
+    assert {n: nodes[:2] for n, (_, nodes) in model.elements.items()} == {1: (1, 2), 2: (2, 3), 11: (3, 4), 12: (4, 5)}
+    assert model.notes == [f"the set {name}, whose nodes no element has" for name in ("mid", "p", "q")]
+
+
+@pytest.mark.parametrize("card, table, expected", [
+    ("RBE2,7,100,123456,13,14,15,16\nCONM2,8,100,,5.,,,,\n,1.,,2.,,,3.\n", "rigid_body",
+     [{"name": "rbe2_7_node", "surfaces": "rbe2_7", "at": [0.5, 0.5, 3], "mass": 5, "inertia": [1, 2, 3, 0, 0, 0], "free": "all"}]),
+    ("RBE2,7,100,123,13,14,15,16\nSPC1,1,1246,100\n", "rigid_body",
+     [{"name": "rbe2_7_node", "surfaces": "rbe2_7", "at": [0.5, 0.5, 3], "free": "z ry", "motions": "x y z"}]),
+    ("RBE3,7,,100,123456,1.,123,13,14\n,15,16\nMOMENT,2,100,,3.,0.,0.,1.\n", "coupling",
+     [{"name": "rbe3_7_node", "on": "rbe3_7", "at": [0.5, 0.5, 3]}]),
+    ("CELAS2,9,4.+6,13,2\n", "spring", [{"from": "node_13", "direction": "y", "stiffness": 4e6}]),
+    ("PELAS,3,4.+6\nCELAS1,9,3,13,2,100,2\n", "spring", [{"from": "node_13", "to": "node_100", "direction": "y", "stiffness": 4e6}]),
+    ("PBUSH,3,K,1.,2.,3.,4.,5.,6.\n,B,7.,8.,9.\nCBUSH,9,3,100,101,0\n", "connector", None),
+    ("PBUSH,3,K,1.,2.,3.,4.,5.,6.\n,B,7.,8.,9.\nCBUSH,9,3,100,101,1.,0.,0.\n", "connector",
+     [{"from": "node_100", "to": "node_101", "stiffness": [1, 2, 3, 4, 5, 6], "damping": [7, 8, 9, 0, 0, 0], "axis_1": [0, 0, 1], "axis_2": [1, 0, 0]}]),
+    ("PBAR,3,1,4.-2,1.-4,2.-4,3.-4\nCBAR,9,3,100,101,1.,0.,0.\n", "beam",
+     [{"name": "bar_9", "from": "node_100", "to": "node_101", "young": 2e11, "poisson": 0.25, "density": 7800, "area": 0.04,
+       "bending": [1e-4, 2e-4], "torsion": 3e-4, "elements": 1, "axis_2": [1, 0, 0]}]),
+    ("PLOAD4,2,2,3.+5,,,,13,15\n", "pressure", [{"on": "pressed", "value": 3e5}]),
+    ("FORCE,2,13,,2.,0.,0.,-1.\nFORCE,2,13,,1.,1.,0.,0.\n", "force", [{"on": "node_13", "vector": [1, 0, -2]}]),
+    ("CORD2C,5,,.5,.5,0.,.5,.5,1.\n,1.5,.5,0.\nGRID,13,,0.,0.,2.,5\nSPC1,1,1,13\n", "support",
+     [{"on": "spc_1_123", "fixed": "x y z"}, {"on": "spc_1_1_in_5", "fixed": "x", "cylinder": {"axis": [0, 0, 1], "centre": [0.5, 0.5, 0]}}]),
+])
+def test_cards_of_bulk_data(tmp_path, card, table, expected):
+    grids = GRIDS.replace("GRID,13,,0.,0.,2.\n", "") if "GRID,13" in card else GRIDS
+    scene, left_out = converted(tmp_path, grids + card, "deck.bdf")
+    if expected is None:
+        assert table not in scene and "without an orientation" in left_out[0]
+    else:
+        assert scene[table] == expected and left_out == []
+
+
+def test_names_surfaces_and_contacts_of_optistruct(tmp_path, squeal):
+    """Small fields, continuations, names in comments, SURF by corners of faces, CONTACT by PCONT, and the selected load."""
+    def row(*fields):
+        return "".join(f"{field:<8}" for field in fields) + "\n"
+
+    text = "SUBCASE 1\n  SPC = 1\n  LOAD = 3\nBEGIN BULK\n" + GRIDS + '$HMNAME PROP                   1"strip" 4\n$HMNAME PROP                   2"pad" 4\n'
+    text += '$HMNAME CONTACTSURF           11"strip_top"\n' + row("SURF", 11, "ELFACE") + row("+", 1, 5, 7, 0)
+    text += '$HMNAME CONTACTSURF           12"pad_bottom"\n' + row("SURF", 12, "ELFACE") + row("+", 2, 9, 11, 0)
+    text += '$HMSET        4        1 "corner"\n' + row("SET", 4, "GRID", "LIST") + row("+", 13)
+    text += row("CONTACT", 1, 50, 12, 11) + row("PCONT", 50, "", "", 0.4) + row("EIGRL", 5, "", "9000.")
+    text += "PLOAD4,2,2,1.,,,,13,15\nLOAD,3,2.,5.+4,2\nENDDATA\n"
+    scene, left_out = converted(tmp_path, text, "deck.fem")
+    assert left_out == [] and [part["name"] for part in scene["part"]] == ["strip", "pad"]
+    assert scene["contact"] == [{"rotor": "strip_top", "stator": "pad_bottom", "friction": 0.4}]
+    assert scene["pressure"] == [{"on": "pressed", "value": 1e5}] and scene["modes"] == {"band": 9000}
+    assert '"corner"' in (tmp_path / "out" / "deck.msh").read_text()
+    assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
+
+
+@pytest.mark.parametrize("deck", ["inp", "bdf"])
+def test_named_faces_of_quadratic_solids(tmp_path, deck):
+    """gmsh writes them as CPS6 and CTRIA6: surfaces where they lie on solids."""
+    at = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (.5, 0, 0), (.5, .5, 0), (0, .5, 0), (0, 0, .5), (.5, 0, .5), (0, .5, .5)]
+    if deck == "inp":
+        text = "*NODE\n" + "".join(f"{i}, {x}, {y}, {z}\n" for i, (x, y, z) in enumerate(at, 1))
+        text += "*ELEMENT, TYPE=CPS6, ELSET=Surface1\n1, 1,3,2,7,6,5\n*ELEMENT, TYPE=C3D10, ELSET=Volume1\n2, 1,2,3,4,5,6,7,8,9,10\n*ELSET, ELSET=foot\n1\n"
+    else:
+        text = "".join(f"GRID,{i},,{x:.1f},{y:.1f},{z:.1f}\n" for i, (x, y, z) in enumerate(at, 1))
+        text += "CTRIA6,1,9,1,3,2,7,6,5\nCTETRA,2,2,1,2,3,4,5,6\n,7,8,9,10\n"
+    (tmp_path / f"deck.{deck}").write_text(text)
+    model = TOOL.read_deck(tmp_path / f"deck.{deck}")
+    assert model.surfaces["foot" if deck == "inp" else "property_9"] == [(1, 3, 2, 7, 6, 5)]
+    assert len(model.parts) == 1 and model.notes == []
+
+
+def cdb(elements, more="", at=AT):
+    """A deck as CDWRITE has it: bricks of SOLID185 with material 1, and other elements."""
+    nodes = "".join(f"{i:9d}{0:9d}{0:9d}{x:21.13E}{y:21.13E}{z:21.13E}\n" for i, (x, y, z) in enumerate(at, 1))
+    rows = "".join("".join(f"{v:9d}" for v in [material, kind, real, 1, 0, 0, 0, 0, len(of), 0, label, *of][:19])
+                   + ("\n" + "".join(f"{v:9d}" for v in of[8:]) if len(of) > 8 else "") + "\n" for label, material, kind, real, of in elements)
+    return (f"/COM,ANSYS RELEASE 19.2\n/PREP7\nET,1,185\nET,2,170\nET,3,174\nET,4,186\nNBLOCK,6,SOLID,{len(at)},{len(at)}\n(3i9,6e21.13e3)\n"
+            f"{nodes}N,R5.3,LOC,       -1,\nEBLOCK,19,SOLID,{len(elements)},{len(elements)}\n(19i9)\n{rows}       -1\n"
+            "MPDATA,R5.0, 1,EX  ,     1, 1, 2.00000000E+11    ,\nMPDATA,R5.0, 1,NUXY,     1, 1, 0.250000000    ,\n"
+            f"MPDATA,R5.0, 1,DENS,     1, 1, 7800.00000    ,\n{more}/GO\nFINISH\n")
+
+
+BRICK_ROWS = [(1, 1, 1, 1, [*range(1, 9)]), (2, 1, 1, 1, [*range(9, 17)])]
+
+
+def test_commands_of_ansys(tmp_path, squeal):
+    """Components with a range, supports, a force, an acceleration, and a contact pair whose material has the friction."""
+    rows = [*BRICK_ROWS, (3, 3, 2, 7, [5, 6, 7, 8]), (4, 3, 3, 7, [9, 12, 11, 10])]
+    more = ("CMBLOCK,BASE,NODE,       2  ! users node component\n(8i10)\n         1        -4\nCMBLOCK,LOW,ELEM,       1\n(8i10)\n         1\n"
+            "MPDATA,R5.0, 1,MU  ,     3, 1, 0.400000000    ,\nF,13,FZ,-8.,0.\nACEL,0.,0.,9.81\nCE,R5.0,DEFI,2,1,0.\n"
+            + "".join(f"D,{n},{label},0.,0.\n" for n in range(1, 5) for label in ("UX", "UY", "UZ")))
+    scene, left_out = converted(tmp_path, cdb(rows, more), "deck.cdb")
+    assert left_out == ["the commands CE (1)"]
+    assert [part["name"] for part in scene["part"]] == ["material_1"] and scene["part"][0]["young"] == 2e11
+    assert scene["support"] == [{"on": "BASE", "fixed": "x y z"}] and scene["gravity"] == [0, 0, -9.81]
+    assert scene["force"] == [{"on": "node_13", "vector": [0, 0, -8]}]
+    assert scene["contact"] == [{"rotor": "target_7", "stator": "contact_7", "friction": 0.4}]
+    assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
+
+
+def test_degenerate_bricks_of_ansys(tmp_path):
+    """Bricks that repeat corners are wedges and tetrahedra."""
+    rows = [(1, 1, 1, 1, [1, 2, 3, 3, 5, 6, 7, 7]), (2, 1, 1, 1, [9, 10, 11, 11, 13, 13, 13, 13])]
+    (tmp_path / "deck.cdb").write_text(cdb(rows))
+    model = TOOL.read_deck(tmp_path / "deck.cdb")
+    assert list(model.elements.values()) == [("wedge6", (1, 2, 3, 5, 6, 7)), ("tet4", (9, 10, 11, 13))]
+
+
+@pytest.mark.parametrize("name", ["deck.txt", "deck.bdf", "deck"])
+def test_the_reader_is_chosen_by_what_a_file_holds(tmp_path, name):
+    for text in (BRICKS, GRIDS, cdb(BRICK_ROWS)):
+        (tmp_path / name).write_text(text)
+        assert len(TOOL.read_deck(tmp_path / name).elements) == 2
+
+
+def test_one_brake_in_three_formats(module_run, tmp_path):
+    """The same mesh, material, coupling, spring, mass, friction and force: the same eigenvalues."""
+    inp = BRICKS + ("*COUPLING, CONSTRAINT NAME=c, REF NODE=100, SURFACE=high_top\n*KINEMATIC\n*ELEMENT, TYPE=MASS, ELSET=lump\n50, 100\n"
+                    "*MASS, ELSET=lump\n64\n*ELEMENT, TYPE=SPRING1, ELSET=s\n51, 100\n*SPRING, ELSET=s\n3\n1048576.\n*BOUNDARY\n100, 1, 2\n100, 4, 6\n"
+                    "*SURFACE INTERACTION, NAME=rub\n*FRICTION\n0.5\n*CONTACT PAIR, INTERACTION=rub\nhigh_bottom, low_top\n*CLOAD\n100, 3, -4096.\n")
+    bdf = GRIDS + ("RBE2,7,100,123456,13,14,15,16\nCONM2,8,100,,64.\nCELAS2,9,1048576.,100,3\nSPC1,1,12456,100\nFORCE,2,100,,4096.,0.,0.,-1.\n"
+                   "SURF,11,ELFACE,,,,,,\n,1,5,7\nSURF,12,ELFACE,,,,,,\n,2,9,11\nCONTACT,1,0.5,12,11\n")
+    found = []
+    for text, name in ((inp, "deck.inp"), (bdf, "deck.bdf")):
+        folder = tmp_path / name
+        folder.mkdir()
+        scene, left_out = converted(folder, text, name)
+        assert left_out == [] and scene["contact"][0]["friction"] == 0.5
+        found.append(eigenvalues(module_run(slid(folder / "out" / "scene.toml"), ranks=1)))
+    folder = tmp_path / "deck.cdb"
+    folder.mkdir()
+    more = "MPDATA,R5.0, 1,MU  ,     3, 1, 0.5    ,\n" + "".join(f"D,{n},{label},0.,0.\n" for n in range(1, 5) for label in ("UX", "UY", "UZ"))
+    more += "CMBLOCK,LID,NODE,       4\n(8i10)\n        13        14        15        16\n"
+    converted(folder, cdb([*BRICK_ROWS, (3, 3, 2, 7, [5, 6, 7, 8]), (4, 3, 3, 7, [9, 12, 11, 10])], more), "deck.cdb")
+    body = ('[[rigid_body]]\nname = "c"\nsurfaces = "LID"\nat = [0.5, 0.5, 3]\nmass = 64\nfree = "z"\n[[spring]]\nfrom = "c"\ndirection = "z"\n'
+            'stiffness = 1048576\n[[force]]\non = "c"\nvector = [0, 0, -4096]\n')
+    scene = folder / "out" / "scene.toml"
+    scene.write_text(scene.read_text() + body)
+    found.append(eigenvalues(module_run(slid(scene), ranks=1)))
+    assert len(found[0]) > 3
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], rtol=1e-10)
+
+
+def slid(scene):
+    """The scene with its contact driven, and its modes alone."""
+    text = scene.read_text().replace("friction = 0.5", "friction = 0.5\nvelocity = [1, 0, 0]")
+    scene.write_text(text + '\n[modes]\nmethod = "full"\nband = 2000\n\n[estimate]\nenabled = false\n')
+    return scene
+
+
+def eigenvalues(report):
+    found = [complex(m["growth_rate"], 2 * np.pi * m["frequency_hz"]) for m in report["modes"]["modes"]]
+    return np.array(sorted(found, key=lambda value: value.imag))
+
+
+ROUND = """title = "round"
+gravity = [0, 0, -9.8125]
+[mesh]
+file = "deck.msh"
+[[part]]
+name = "low"
+young = 2e11
+poisson = 0.25
+density = 7800
+beta = 1e-7
+[[part]]
+name = "high"
+orthotropic = { young = [8e9, 4e9, 2e9], poisson = [0.125, 0.25, 0.25], shear = [2e9, 1e9, 1e9], axis_1 = [0, 1, 0], axis_2 = [1, 0, 0] }
+density = 2500
+[[support]]
+on = "base"
+fixed = "x y z"
+[[rigid_body]]
+name = "grip"
+surfaces = "high_top"
+at = [0.5, 0.5, 3]
+mass = 64
+inertia = [8, 8, 4, 0, 0, 0]
+free = "x y z"
+[[point]]
+name = "anchor"
+at = [0.5, 0.5, 5]
+free = "none"
+[[spring]]
+from = "grip"
+to = "anchor"
+direction = "x"
+stiffness = 1e6
+damping = 64
+[[spring]]
+from = "grip"
+direction = "y"
+stiffness = 2e6
+[[coupling]]
+name = "mean"
+on = "low_top"
+at = [0.5, 0.5, 1]
+mass = 2
+[[beam]]
+name = "rod"
+from = "grip"
+to = "mean"
+young = 2e11
+poisson = 0.25
+density = 7800
+diameter = 0.125
+elements = 2
+[[mass]]
+on = "corner"
+mass = 3
+[[force]]
+on = "grip"
+vector = [0, 0, -65536]
+[[pressure]]
+on = "high_top"
+value = 1e4
+[[bolt]]
+name = "tight"
+beam = "rod"
+tension = 1024
+[[contact]]
+rotor = "low_top"
+stator = "high_bottom"
+velocity = [0.5, 0.25, 0]
+friction = 0.375
+static_coefficient = 0.5
+decay_speed = 0.5
+compliance = 1e-12
+[[step]]
+name = "tighten"
+forces = [0.25]
+pressures = [0]
+friction = 0
+bolts = "tight"
+[[step]]
+name = "turn"
+[modes]
+method = "full"
+band = 2000
+[estimate]
+enabled = false
+"""
+
+
+def test_a_scene_goes_to_a_deck_and_back(module_run, tmp_path):
+    """Contacts, a bolt along a beam, couplings, springs, steps and friction: what comes back runs as it is, with the same modes."""
+    converted(tmp_path, BRICKS + "*NSET, NSET=corner\n13\n")
+    scene = tmp_path / "out" / "scene.toml"
+    scene.write_text(ROUND)
+    before = eigenvalues(module_run(scene, ranks=1))
+    old = sys.argv
+    sys.argv = ["mesh", str(scene), str(tmp_path / "back.inp"), "--to", "inp"]
+    try:
+        TOOL.main()
+    finally:
+        sys.argv = old
+    (tmp_path / "second").mkdir()
+    returned, left_out = converted(tmp_path / "second", (tmp_path / "back.inp").read_text())
+    assert left_out == [] and len(returned["contact"]) == len(returned["bolt"]) == 1 and len(returned["step"]) == 2
+    assert returned["step"][0]["friction"] == 0 and returned["contact"][0]["velocity"] == [0.5, 0.25, 0]
+    file = tmp_path / "second" / "out" / "scene.toml"
+    file.write_text(file.read_text().replace("[modes]", '[estimate]\nenabled = false\n\n[modes]\nmethod = "full"'))
+    after = eigenvalues(module_run(file, ranks=1))
+    assert len(before) > 3
+    np.testing.assert_allclose(after, before, rtol=1e-9)

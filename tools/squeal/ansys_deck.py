@@ -1,0 +1,380 @@
+"""Decks of Ansys, as CDWRITE writes them, to a mesh_model.Model: blocks of nodes, elements and components, materials,
+supports, loads, contact pairs and bolts."""
+
+import re
+from collections import Counter
+
+import numpy as np
+from squeal.deck_files import Problem, lines_of, number, whole
+from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part, corners_of
+
+# squeal's kinds by element type and by the number of different nodes
+SOLIDS = {45: 8, 65: 8, 185: 8, 190: 8, 95: 20, 186: 20, 92: 10, 187: 10, 285: 4}
+SHELLS = {63: 4, 181: 4, 43: 4}
+TARGETS, CONTACTS = {169, 170}, {171, 172, 173, 174, 175, 177}
+SKINS = {152: 4, 154: 8}
+MOTION_OF = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "rx", "ROTY": "ry", "ROTZ": "rz"}
+FORCE_OF = {name: i for i, name in enumerate(("FX", "FY", "FZ", "MX", "MY", "MZ"))}
+ELASTIC = {"EX": "young", "PRXY": "poisson", "NUXY": "poisson", "DENS": "density", "DMPR": "loss_factor", "BETD": "beta", "ALPD": "alpha"}
+ORTHOTROPIC = ("EX", "EY", "EZ", "PRXY", "PRXZ", "PRYZ", "GXY", "GXZ", "GYZ")
+# hexahedra that stand for wedges and tetrahedra: which of their corners and mid-sides are the other's
+WEDGE_OF = [0, 1, 2, 4, 5, 6]
+TET_OF = [0, 1, 2, 4]
+SILENT = set("/COM /NOPR /GOPR /PREP7 /TITLE /SOLU /GO /OUTPUT /UNITS /VIEW /AUTO FINISH NUMOFF *IF *ELSE *ENDIF *SET DOF N R5.3 MPTEMP "
+             "EXTOPT TREF IRLF BFUNIF ACEL OMEGA DOMEGA CGLOC CGOMEGA DCGOMG KUSE TIME ALPHAD BETAD DMPRAT DMPSTR CRPLIM NCNV "
+             "NEQIT ERESX TOFFST RLBLOCK KEYOPT SECTYPE SECBLOCK ANTYPE ETBLOCK LSCLEAR FCUM DELTIM KBC SHPP SHELL".split())
+
+
+class Deck:
+    """What the handlers of commands share."""
+
+    def __init__(self, file):
+        self.model = Model(file)
+        self.types, self.materials = {}, {}
+        self.constants = {}  # of materials by number and label
+        self.of_pair = {}  # faces and kind by the number of a real constant: "target", "contact"
+        self.frictions = {}
+        self.held = {}
+        self.bodies = {}  # elements by material and type
+        self.left_out, self.other_elements = Counter(), Counter()
+        self.bolts = {}  # section of a bolt: elements' nodes, by section number
+        self.tension = {}
+
+    def note(self, what, place):
+        self.model.notes.append(f"{what} ({place.rpartition(', ')[2]})")
+
+
+class Lines:
+    """Lines with their places, of which blocks take their own."""
+
+    def __init__(self, file):
+        self.file, self.rows, self.at = file, list(lines_of(file)), 0
+
+    def next(self):
+        self.at += 1
+        return self.rows[self.at - 1][1]
+
+    def place(self, back=1):
+        return f"{self.file}, line {self.rows[max(self.at - back, 0)][0]}" if self.rows else str(self.file)
+
+    def more(self):
+        return self.at < len(self.rows)
+
+
+def read_cdb(file):
+    deck, lines = Deck(file), Lines(file)
+    while lines.more():
+        line = lines.next().split("!")[0].strip()
+        if not line:
+            continue
+        words = [word.strip() for word in line.split(",")]
+        name = words[0].upper()
+        if name in BLOCKS:
+            BLOCKS[name](words, lines, deck)
+        elif name in COMMANDS:
+            COMMANDS[name](words, lines.place(), deck)
+        elif re.match(r"[A-Z/*]", name) and name not in SILENT and not name.startswith("_"):
+            deck.left_out[name] += 1
+    finish(deck)
+    return deck.model
+
+
+# ---- blocks
+
+
+def widths_of(text, place):
+    """Widths of fields of a Fortran format such as (3i9,6e21.13e3); what letters they have."""
+    found = []
+    for count, letter, width in re.findall(r"(\d*)([ieg])(\d+)", text.lower()):
+        found += [(letter, int(width))] * int(count or 1)
+    if not found or len(found) > 100:
+        raise Problem(f"{place}: '{text.strip()[:40]}': expected a format such as (3i9,6e21.13e3)")
+    return found
+
+
+def fields_of(line, widths):
+    found, at = [], 0
+    for _, width in widths:
+        if at >= len(line.rstrip()):
+            break
+        found.append(line[at : at + width].strip())
+        at += width
+    return found
+
+
+def read_nodes(words, lines, deck):
+    """NBLOCK: number, two others in old forms, x, y, z; absent ones are 0."""
+    if not lines.more():
+        raise Problem(f"{lines.place()}: NBLOCK without a format")
+    widths = widths_of(lines.next(), lines.place())
+    first = sum(letter == "i" for letter, _ in widths)
+    while lines.more():
+        line = lines.next()
+        if line.lstrip()[:2].upper() in ("N,", "-1", "NB") or not line.strip():
+            break
+        fields = fields_of(line, widths)
+        position = [number(field or "0", lines.place()) for field in fields[first : first + 3]]
+        label = whole(fields[0], lines.place())
+        if not 0 < label < 2**31:
+            raise Problem(f"{lines.place()}: node {label}: expected a number from 1 to {2**31 - 1}")
+        deck.model.nodes[label] = np.array(position + [0.0] * (3 - len(position)))
+
+
+def read_elements(words, lines, deck):
+    """EBLOCK of solids: material, type, real, section, system, four others, count, an empty one, number, nodes."""
+    if not lines.more():
+        raise Problem(f"{lines.place()}: EBLOCK without a format")
+    widths = widths_of(lines.next(), lines.place())
+    solid = len(words) > 2 and words[2].upper() == "SOLID"
+    while lines.more():
+        fields = fields_of(lines.next(), widths)
+        place = lines.place()
+        if not fields or fields[0] == "-1":
+            break
+        values = [whole(field, place) for field in fields]
+        if not solid:
+            deck.left_out["EBLOCK of no SOLID"] += 1
+            continue
+        if len(values) < 11:
+            raise Problem(f"{place}: {len(values)} fields; expected 11 before the nodes of an element")
+        count = values[8]
+        while len(values) < 11 + count and lines.more():
+            values += [whole(field, place) for field in fields_of(lines.next(), widths)]
+        if len(values) != 11 + count:
+            raise Problem(f"{place}: {len(values) - 11} nodes; expected {count}")
+        add_element(deck, place, values[10], values[:4], values[11:])
+
+
+def kind_of(kind, nodes, place):
+    """The kind of a solid, and its nodes without those that a degenerate form repeats."""
+    if kind in (92, 187):
+        return "tet10", nodes[:10]
+    if kind == 285:
+        return "tet4", nodes[:4]
+    corners = nodes[:8]
+    if len(nodes) < 8:
+        raise Problem(f"{place}: {len(nodes)} nodes of element type {kind}; expected 8 or 20")
+    different = len(set(corners))
+    mids = nodes[8:20]
+    if different == 8:
+        return ("hex20", nodes[:20]) if len(mids) == 12 and all(mids) else ("hex8", corners)
+    if different == 6 and corners[2] == corners[3] and corners[6] == corners[7]:
+        if mids and all(mids):
+            raise Problem(f"{place}: a wedge of 15 nodes, which has no element in squeal: expected linear wedges or tetrahedra")
+        return "wedge6", [corners[i] for i in WEDGE_OF]
+    if different == 4 and len(set(corners[4:])) == 1 and corners[2] == corners[3]:
+        if len(mids) == 12 and all(mids):  # edges IJ, JK, KI, IM, JM, KM
+            return "tet10", [corners[i] for i in TET_OF] + [mids[i] for i in (0, 1, 3, 8, 9, 10)]
+        return "tet4", [corners[i] for i in TET_OF]
+    raise Problem(f"{place}: an element of {different} corners, which has no element in squeal: expected tetrahedra, wedges "
+                  "or bricks")
+
+
+def add_element(deck, place, label, attributes, nodes):
+    material, kind_number, real, section = attributes
+    kind, model = deck.types.get(kind_number), deck.model
+    if kind in SOLIDS:
+        shape, nodes = kind_of(kind, nodes, place)
+        model.add_element(place, label, shape, nodes, "abaqus")
+        deck.bodies.setdefault((material, 0), []).append(label)
+    elif kind in SHELLS:
+        shape = "tri3" if nodes[2] == nodes[3] else "quad4"
+        model.add_element(place, label, shape, nodes[: 3 if shape == "tri3" else 4], "abaqus")
+        deck.bodies.setdefault((material, section or 1), []).append(label)
+    elif kind in TARGETS | CONTACTS:
+        side = "target" if kind in TARGETS else "contact"
+        deck.of_pair.setdefault(real, {"material": material}).setdefault(side, []).append(face_of(nodes))
+        if side == "contact":
+            deck.of_pair[real]["material"] = material
+    elif kind == 179:
+        deck.bolts.setdefault(section, []).append((place, nodes))
+    elif kind == 21:
+        deck.other_elements["MASS21"] += 1
+    else:
+        deck.other_elements[f"type {kind}"] += 1
+
+
+def face_of(nodes):
+    """Corners, then mid-sides where they are there, without those that a triangle repeats."""
+    corners = [n for i, n in enumerate(nodes[:4]) if n and n not in nodes[:i]]
+    mids = [n for i, n in enumerate(nodes[4:8]) if n and (len(corners) == 4 or i != 2)]
+    return tuple(corners + (mids if len(mids) == len(corners) else []))
+
+
+def read_component(words, lines, deck):
+    """CMBLOCK: numbers, of which a negative one ends a range."""
+    if len(words) < 4 or not lines.more():
+        raise Problem(f"{lines.place()}: '{','.join(words)[:60]}': expected CMBLOCK,NAME,NODE or ELEM,COUNT")
+    name, kind, count, place = words[1], words[2].upper(), whole(words[3], lines.place()), lines.place()
+    widths, numbers = widths_of(lines.next(), lines.place()), []
+    while lines.more() and len(numbers) < count:
+        numbers += [whole(field, lines.place()) for field in fields_of(lines.next(), widths)]
+    if len(numbers) != count:
+        raise Problem(f"{place}: {len(numbers)} numbers of {name}; expected {count}")
+    items = []
+    for n in numbers:
+        if n >= 0:
+            items.append(n)
+        elif not items or -n < items[-1]:
+            raise Problem(f"{place}: {name} has the range to {-n} without a smaller beginning")
+        else:
+            items += range(items[-1] + 1, -n + 1)
+    if kind.startswith("NODE"):
+        deck.model.node_sets[name] = items
+    else:
+        deck.model.element_sets[name] = items
+
+
+BLOCKS = {"NBLOCK": read_nodes, "EBLOCK": read_elements, "CMBLOCK": read_component}
+
+# ---- commands
+
+
+def element_type(words, place, deck):
+    if len(words) < 3:
+        raise Problem(f"{place}: '{','.join(words)}': expected ET, a number and an element type")
+    deck.types[whole(words[1], place)] = whole(re.sub(r"\D", "", words[2]), place, "an element type such as 185")
+
+
+def material_data(words, place, deck):
+    """MPDATA,R5.0,1,label,number,place,value: the first temperature alone; also without its first two words, and MP."""
+    values = words[1:]
+    if words[0].upper() == "MP":
+        label, material, value = (*values, "", "", "")[:3]
+    else:
+        if values and values[0].upper().startswith("R"):
+            values = values[2:]
+        label, material, start, value = (*values, "", "", "", "")[:4]
+        if start not in ("", "1"):
+            return
+    deck.constants.setdefault(whole(material, place), {})[label.upper()] = number(value, place)
+
+
+def support(words, place, deck):
+    """D,node,label,value; a range of nodes has its end in the fifth word."""
+    node, label = whole(words[1] if len(words) > 1 else "", place), words[2].upper() if len(words) > 2 else ""
+    value = number(words[3] or "0", place) if len(words) > 3 else 0.0
+    motions = {"ALL": MOTIONS}.get(label, (MOTION_OF[label],) if label in MOTION_OF else ())
+    if not motions:
+        deck.note(f"D of {label} of node {node}", place)
+        return
+    for motion in motions:
+        deck.held.setdefault(node, {})[motion] = value
+
+
+def force(words, place, deck):
+    node, label = whole(words[1] if len(words) > 1 else "", place), words[2].upper() if len(words) > 2 else ""
+    if label not in FORCE_OF:
+        deck.note(f"F of {label} on node {node}", place)
+        return
+    found = deck.model.joints.forces.setdefault(node, [0.0] * 6)
+    found[FORCE_OF[label]] = number(words[3] if len(words) > 3 else "", place)
+
+
+def equation(words, place, deck):
+    deck.left_out["CE"] += 1
+
+
+def gravity(words, place, deck):
+    values = [number(word or "0", place) for word in (words[1:] + ["0"] * 3)[:3]]
+    if any(values):
+        deck.model.gravity = [-v for v in values]  # an acceleration of the frame
+
+
+COMMANDS = {"ET": element_type, "MPDATA": material_data, "MP": material_data, "D": support, "F": force, "CE": equation, "ACEL": gravity}
+
+
+# ---- what the whole deck makes
+
+
+def finish(deck):
+    model = deck.model
+    if not model.nodes:
+        raise Problem(f"{model.source}: no NBLOCK")
+    for material, constants in deck.constants.items():
+        model.materials[material] = material_of(constants, material, deck)
+    several = Counter(material for material, _ in deck.bodies)
+    for (material, section), elements in deck.bodies.items():
+        name = f"material_{material}" + (f"_shells_{section}" if section and several[material] > 1 else "")
+        model.parts[model.unused(name)] = Part(elements, material)
+    name_parts(model)
+    supports(deck)
+    pairs(deck)
+    for section, elements in deck.bolts.items():
+        deck.note(f"the bolt of section {section}: {len(elements)} PRETS179, whose two sides have nodes of their own", elements[0][0])
+    model.notes += [f"{count} elements of {name}" for name, count in sorted(deck.other_elements.items())]
+    if deck.left_out:
+        model.notes.append("the commands " + ", ".join(f"{name} ({count})" for name, count in sorted(deck.left_out.items())))
+
+
+def name_parts(model):
+    """A part whose elements are those of a component has its name."""
+    for name, elements in list(model.element_sets.items()):
+        known = [n for n in elements if n in model.elements]
+        if len(known) < len(elements):
+            model.notes.append(f"{len(elements) - len(known)} of the {len(elements)} elements of {name}, which the mesh has not")
+        model.element_sets[name] = known
+        same = next((part for part, of in model.parts.items() if set(of.elements) == set(known)), None)
+        if same:
+            model.parts[name] = model.parts.pop(same)
+            del model.element_sets[name]
+    for name, elements in list(model.element_sets.items()):
+        flat = [model.elements[n][1] for n in elements if model.elements[n][0] in FLAT]
+        model.element_sets[name] = [n for n in elements if model.elements[n][0] in KINDS]
+        if flat:
+            model.surfaces[model.unused(name + "_faces")] = flat
+        if not model.element_sets[name]:
+            del model.element_sets[name]
+
+
+def material_of(constants, material, deck):
+    if all(label in constants for label in ORTHOTROPIC):
+        values = [constants[label] for label in ORTHOTROPIC]
+        return {"orthotropic": {"young": values[:3], "poisson": values[3:6], "shear": values[6:]}, "density": constants.get("DENS", 0.0)}
+    others = set(constants) - set(ELASTIC) - {"MU", "GXY", "ALPX", "CTEX", "REFT", "KXX", "C"}
+    if others and "EX" in constants:
+        deck.model.notes.append(f"{', '.join(sorted(others))} of material {material}")
+    return {ELASTIC[label]: value for label, value in constants.items() if label in ELASTIC}
+
+
+def supports(deck):
+    """Nodes that are held alike are a set, by the name of the component that has just these."""
+    model = deck.model
+    used = {node for _, nodes in model.elements.values() for node in nodes}
+    alike = {}
+    for node, held in deck.held.items():
+        if node not in model.nodes:
+            model.notes.append(f"the support of node {node}, which the deck does not define")
+        elif node in used:
+            alike.setdefault(tuple(sorted(held.items())), []).append(node)
+        else:
+            model.joints.held[node] = set(held)
+    names = {frozenset(nodes): name for name, nodes in model.node_sets.items()}
+    for i, (held, nodes) in enumerate(alike.items(), 1):
+        motions = [m for m in MOTIONS if m in dict(held)]
+        name = names.get(frozenset(nodes)) or model.unused(f"held_{i}")
+        model.node_sets[name] = nodes
+        values = [dict(held).get(m, 0.0) for m in MOTIONS]
+        keys = {"displacement": values[:3]} if any(values[:3]) else {}
+        model.supports.append((name, motions, keys | ({"rotation": values[3:]} if any(values[3:]) else {})))
+
+
+def pairs(deck):
+    """Contact and target elements of one real constant are a contact; its material has the friction."""
+    model, free = deck.model, None
+    for real, pair in deck.of_pair.items():
+        if "target" not in pair or "contact" not in pair:
+            model.notes.append(f"the {'target' if 'target' in pair else 'contact'} elements of real constant {real}, which have no other side")
+            continue
+        free = free or model.free_faces(model.solids())
+        names = []
+        for side in ("contact", "target"):
+            faces = [free[corners_of(face)] for face in pair[side] if len(face) in (3, 4, 6, 8) and corners_of(face) in free]
+            if len(faces) < len(pair[side]):
+                model.notes.append(f"{len(pair[side]) - len(faces)} {side} elements of real constant {real}, which lie on no solid")
+            if faces:
+                names.append(model.unused(f"{side}_{real}"))
+                model.surfaces[names[-1]] = faces
+        if len(names) == 2:
+            friction = deck.constants.get(pair["material"], {}).get("MU", 0.0)
+            model.contacts.append((*names, {"friction": friction}))
