@@ -6,8 +6,14 @@ set(packaging ${CMAKE_CURRENT_LIST_DIR})
 # Licence and changes have names of their own; libraries are found without a path.
 file(REMOVE ${doc}/LICENSE)
 file(COPY_FILE ${packaging}/copyright ${doc}/copyright)
-execute_process(COMMAND gzip -9n ${doc}/CHANGELOG.md COMMAND_ERROR_IS_FATAL ANY)
-file(RENAME ${doc}/CHANGELOG.md.gz ${doc}/changelog.gz)
+string(TIMESTAMP now "%a, %d %b %Y %H:%M:%S +0000" UTC) # of SOURCE_DATE_EPOCH where it is set
+file(WRITE ${doc}/changelog "squeal (${CPACK_PACKAGE_VERSION}) unstable; urgency=medium
+
+  * CHANGELOG.md beside this file says what is new.
+
+ -- ${CPACK_PACKAGE_CONTACT}  ${now}
+")
+execute_process(COMMAND gzip -9n ${doc}/changelog COMMAND_ERROR_IS_FATAL ANY)
 foreach(program squeal squeal_mesher)
   if(EXISTS ${usr}/bin/${program})
     file(RPATH_REMOVE FILE ${usr}/bin/${program})
@@ -15,16 +21,9 @@ foreach(program squeal squeal_mesher)
 endforeach()
 
 # Debian's own interpreters, whatever else PATH has.
-file(GLOB tools ${usr}/share/squeal/tools/*)
-foreach(tool ${tools})
-  if(NOT IS_DIRECTORY ${tool})
-    file(READ ${tool} text)
-    string(REGEX REPLACE "^#!/usr/bin/env (python3|bash)" "#!/usr/bin/\\1" new "${text}")
-    if(NOT new STREQUAL text)
-      execute_process(COMMAND sed -i "1s|^#!/usr/bin/env |#!/usr/bin/|" ${tool} COMMAND_ERROR_IS_FATAL ANY)
-    endif()
-  endif()
-endforeach()
+file(GLOB tools LIST_DIRECTORIES false ${usr}/share/squeal/tools/*)
+execute_process(COMMAND sed -i -e "1s|^#!/usr/bin/env python3|#!/usr/bin/python3|" -e "1s|^#!/usr/bin/env bash|#!/bin/bash|" ${tools}
+                COMMAND_ERROR_IS_FATAL ANY)
 
 # import squeal
 file(MAKE_DIRECTORY ${usr}/lib/python3/dist-packages)

@@ -36,8 +36,8 @@ PROGRAM = _program()
 def program() -> Path:
     """The program, where it is there; else an error says how it is had."""
     if not PROGRAM.exists():
-        raise SquealError(f"{PROGRAM} is missing: tools/build makes it, a Debian package or a container brings it (tools/README.md); "
-                          "or say where it is by SQUEAL=FILE")
+        raise SquealError(f"{PROGRAM} is missing: tools/build makes it, a Debian package or a container brings it "
+                          "(tools/README.md); or say where it is by SQUEAL=FILE")
     return PROGRAM
 
 
@@ -62,8 +62,9 @@ def needs(*modules: str) -> None:
         return
     names = ", ".join(missing)
     if not owns_process():
-        raise ImportError(f"squeal needs the python module {names}, which {sys.executable} lacks: pip install {' '.join(missing)}, or "
-                          f"take {DEBIAN} with the packages that tools/setup installs", name=missing[0])
+        raise ImportError(f"squeal needs the python module {names}, which {sys.executable} lacks: "
+                          f"pip install {' '.join(missing)}, or take {DEBIAN} with the packages that tools/setup installs",
+                          name=missing[0])
     # A private python first in PATH hides the one whose modules Debian installs.
     if os.path.realpath(sys.executable) == os.path.realpath(DEBIAN) or not os.path.exists(DEBIAN):
         sys.exit(f"{TOOL}: no python module {names}; tools/setup installs what the tools need")

@@ -183,7 +183,7 @@ class Results:
         try:
             import pyvista
         except ImportError:
-            raise SquealError("mesh needs the python module pyvista: pip install pyvista, or tools/setup for build/python") from None
+            raise SquealError("mesh() needs the python module pyvista: pip install pyvista, or build/python") from None
         from squeal.surface import VTK, elements
 
         found = [(VTK[code], nodes) for code, nodes in elements(self.field("mesh/topology"))]
@@ -241,11 +241,11 @@ class Results:
         return self._csv("sweep")
 
     def to_xarray(self) -> "xr.Dataset":
-        """The sweep over its numbers, the direction of rotation and the track of each followed mode; NaN where a point lacks one."""
+        """The sweep over its numbers, the direction of rotation and the track of each mode; NaN where a point lacks one."""
         try:
             import xarray  # noqa: F401, of pandas's
         except ImportError:
-            raise SquealError("to_xarray needs the python module xarray: pip install xarray, or Debian's python3-xarray") from None
+            raise SquealError("to_xarray() needs the python module xarray; tools/setup installs it") from None
         keys, table = self.stage("sweep")["keys"], self.sweep()
         found = table[table["track"].notna()].astype({"track": int}).set_index([*keys, "direction", "track"])
         data = found[["frequency_hz", "growth_rate", "damping_ratio", "backward_error", "mac"]].to_xarray()
