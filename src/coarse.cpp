@@ -31,7 +31,7 @@ Scene scene_on_coarse_mesh(const Scene& scene)
 }
 
 /// The model on the coarse mesh; messages say which mesh they are about.
-Model coarse_model(const Scene& scene, const Model& fine, MPI_Comm comm)
+Model coarse_model(Scene& scene, const Model& fine, MPI_Comm comm)
 {
   const std::string label = "cycle.start = \"coarse\": ";
   Model model;

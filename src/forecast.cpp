@@ -42,7 +42,7 @@ double steps_of_transient(const TransientSettings& transient)
 
 double points_of(const SweepSettings& sweep)
 {
-  double points = static_cast<double>(sweep.values.size());
+  double points = static_cast<double>(std::max(sweep.values.size(), sweep.design.size()));
   if (points == 0) points = std::accumulate(sweep.points.begin(), sweep.points.end(), 1., std::multiplies<>());
   if (sweep.samples > 0) points = sweep.samples;
   return sweep.directions == SweepDirections::both ? 2 * points : points;

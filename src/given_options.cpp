@@ -142,6 +142,22 @@ bool is_option(const std::string& word)
   return word.size() > 1 && word[0] == '-' && (is_letter(word, 1) || (word[1] == '-' && is_letter(word, 2)));
 }
 
+/// A scene whose name is near to this one; empty: there is none.
+std::string hint_of_scene(const std::string& word)
+{
+  const std::filesystem::path given = std::filesystem::path(word).lexically_normal();
+  const std::filesystem::path name = given.has_filename() ? given : given.parent_path();
+  Strings known;
+  std::error_code failed;
+  for (const auto& folder : {name.parent_path(), std::filesystem::path("inputs")})
+    for (const auto& entry : std::filesystem::directory_iterator(folder.empty() ? "." : folder, failed))
+      if (is_file(entry.path() / "scene.toml") || entry.path().extension() == ".toml")
+        known.push_back(folder / entry.path().filename());
+  const std::string under = (std::filesystem::path("inputs") / name).string();
+  return std::ranges::find(known, under) == known.end() ? spelling_hint(name.string(), known)
+                                                        : "; did you mean '" + under + "'?";
+}
+
 void examine(GivenOptions& given)
 {
   const Strings& words = given.words;
@@ -149,7 +165,8 @@ void examine(GivenOptions& given)
   {
     if (!is_option(words[i]))
       throw Error("unexpected argument '" + shortened(words[i]) +
-                  "': a scene is one file that ends in .toml, or a folder that holds a scene.toml");
+                  "': a scene is one file that ends in .toml, or a folder that holds a scene.toml" +
+                  hint_of_scene(words[i]));
     const bool has_value = i + 1 < words.size() && !is_option(words[i + 1]);
     const std::string name = words[i].substr(1), value = has_value ? words[++i] : "";
     if (const std::string problem = problem_of_option(name, value); !problem.empty()) throw Error(problem);

@@ -1,16 +1,14 @@
+#include "squeal/arguments.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/checkpoint.hpp"
-#include "squeal/base/markdown.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/forecast.hpp"
 #include "squeal/given_options.hpp"
-#include "squeal/report/report.hpp"
 #include "squeal/report/results_folder.hpp"
 #include "squeal/run.hpp"
 #include "squeal/tools.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cinttypes>
 #include <cstdio>
 #include <cstdlib>
@@ -23,111 +21,6 @@ namespace
 {
 
 using namespace squeal;
-
-struct Arguments
-{
-  std::filesystem::path scene, output;
-  std::vector<std::string> overrides;
-  RunLimits limits;
-  bool restart = false, dry_run = false, help = false, version = false, allow_scripts = false, force = false;
-  std::string reference;            // page to print; empty: none
-  bool options_in_variable = false; // PETSC_OPTIONS
-  std::string problem;              // said after MPI is up, once
-};
-
-constexpr const char* scene_file = "scene.toml"; // of a scene that is a folder
-
-bool is_scene_folder(const std::string& word)
-{
-  return is_file(std::filesystem::path(word) / scene_file);
-}
-
-/// A number of seconds above 0; otherwise sets the problem.
-void read_seconds(const std::string& word, const std::string& value, double& seconds, std::string& problem)
-{
-  char* end = nullptr;
-  seconds = std::strtod(value.c_str(), &end);
-  if (*end != 0 || !(seconds > 0)) problem = word + " " + value + ": it needs a number of seconds above 0";
-}
-
-/// An argument of squeal's own: how it is written, what the help says, and what it does. Those with a value name it.
-struct Argument
-{
-  const char* name;
-  const char* value; // null: it takes none
-  const char* meaning;
-  void (*take)(Arguments& arguments, const std::string& value);
-};
-
-const std::array known_arguments = {
-    Argument{"--set", "key=value", "overrides a key of the scene, e.g. --set friction.coefficient=0.25",
-             [](Arguments& arguments, const std::string& value) { arguments.overrides.push_back(value); }},
-    Argument{"--output", "DIR", "where results go (results/<scene>)",
-             [](Arguments& arguments, const std::string& value) { arguments.output = value; }},
-    Argument{"--time-limit", "S",
-             "ends the run in order after S seconds, as SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2 and SIGXCPU do",
-             [](Arguments& arguments, const std::string& value)
-             { read_seconds("--time-limit", value, arguments.limits.time_limit, arguments.problem); }},
-    Argument{"--checkpoint", "S", "seconds between checkpoints [600]",
-             [](Arguments& arguments, const std::string& value)
-             { read_seconds("--checkpoint", value, arguments.limits.checkpoint_interval, arguments.problem); }},
-    Argument{"--restart", nullptr,
-             "goes on from the checkpoints of a run that ended early or was killed, if there are any",
-             [](Arguments& arguments, const std::string&) { arguments.restart = true; }},
-    Argument{"--version", nullptr, "versions of squeal and of the libraries it runs on",
-             [](Arguments& arguments, const std::string&) { arguments.version = true; }},
-    Argument{"--help", nullptr, "this text; -help and -h as well",
-             [](Arguments& arguments, const std::string&) { arguments.help = true; }},
-    Argument{"--reference", "PAGE", "keys or results: the page of all keys, options and arguments, or of all results",
-             [](Arguments& arguments, const std::string& value)
-             {
-               arguments.reference = value;
-               if (value != "keys" && value != "results")
-                 arguments.problem = "--reference " + shortened(value) + ": it takes keys or results";
-             }},
-    Argument{"--allow-scripts", nullptr,
-             "lets the scene's geometry run commands and write files, as gmsh's statements can",
-             [](Arguments& arguments, const std::string&) { arguments.allow_scripts = true; }},
-    Argument{"--force", nullptr, "runs even where the forecast says more than a day, or more memory than is free",
-             [](Arguments& arguments, const std::string&) { arguments.force = true; }},
-    Argument{"--dry-run", nullptr,
-             "checks scene and mesh, prints the resolved scene, the model's size and the forecast, and stops",
-             [](Arguments& arguments, const std::string&) { arguments.dry_run = true; }}};
-
-std::string unknown_argument(const std::string& word)
-{
-  std::vector<std::string> names;
-  for (const Argument& known : known_arguments) names.emplace_back(known.name);
-  return "unknown argument " + shortened(word) + "; did you mean " + nearest_word(word.substr(0, 40), names) + "?";
-}
-
-/// Takes squeal's own arguments out of argv; what stays is PETSc's.
-Arguments take_arguments(int& argc, char** argv)
-{
-  Arguments arguments;
-  int kept = 1;
-  for (int i = 1; i < argc; ++i)
-  {
-    const std::string given = argv[i], word = given == "-help" || given == "-h" ? "--help" : given;
-    const auto known = std::ranges::find_if(known_arguments, [&](const Argument& one) { return word == one.name; });
-    if (known != known_arguments.end() && !known->value)
-      known->take(arguments, {});
-    else if (known != known_arguments.end() && i + 1 < argc)
-      known->take(arguments, argv[++i]);
-    else if (known != known_arguments.end())
-      arguments.problem = word + " needs a value: squeal -help lists the arguments";
-    else if (word.starts_with("--"))
-      arguments.problem = unknown_argument(word);
-    else if (arguments.scene.empty() && word[0] != '-' && (word.ends_with(".toml") || is_scene_folder(word)))
-      arguments.scene =
-          word.ends_with(".toml") ? std::filesystem::path(word) : std::filesystem::path(word) / scene_file;
-    else
-      argv[kept++] = argv[i];
-  }
-  argc = kept;
-  argv[argc] = nullptr;
-  return arguments;
-}
 
 /// The default place of the results: named after the scene's folder when the file is called scene.toml.
 std::filesystem::path default_output(const std::filesystem::path& scene)
@@ -163,18 +56,6 @@ std::vector<std::string> options_for_petsc(Arguments& arguments, int argc, char*
   return std::move(given.words);
 }
 
-/// A line for each argument.
-std::string argument_reference()
-{
-  std::string text;
-  for (const Argument& known : known_arguments)
-  {
-    const std::string name = std::string(known.name) + (known.value ? std::string(" ") + known.value : "");
-    text += format("  %-17s %s\n", name.c_str(), known.meaning);
-  }
-  return text;
-}
-
 void print_help()
 {
   std::string prefixes;
@@ -196,10 +77,7 @@ void print_help()
 /// The page inputs/KEYS.md.
 void print_key_page()
 {
-  std::string arguments = markdown_head({"argument", "meaning"}), prefixes;
-  for (const Argument& known : known_arguments)
-    arguments +=
-        markdown_row({markdown_code(known.name + (known.value ? std::string(" ") + known.value : "")), known.meaning});
+  std::string prefixes;
   for (const SolverPrefix& prefix : solver_prefixes) prefixes += std::string(" `-") + prefix.text + "`";
   std::printf(
       "# Keys and options\n\n"
@@ -215,7 +93,7 @@ void print_key_page()
       "Options are of PETSc's database: of the command line, and of the variable `PETSC_OPTIONS`.\n\n%s"
       "\n## Options of solvers\n\nOptions of PETSc's, SLEPc's and MUMPS's own solvers follow the prefixes%s.\n"
       "One that no solver asks for is an error. Those of the whole run are:\n\n```text\n%s```\n",
-      scene_reference().c_str(), arguments.c_str(), option_page().c_str(), prefixes.c_str(),
+      scene_reference().c_str(), argument_page().c_str(), option_page().c_str(), prefixes.c_str(),
       session_option_reference().c_str());
 }
 
@@ -275,6 +153,9 @@ int run_program(const Arguments& arguments)
     std::printf("options come from the command line and from the variable PETSC_OPTIONS\n");
   ProgramOptions options = read_program_options(comm);
   options.force = arguments.force;
+  options.length = arguments.length;
+  options.program = arguments.program;
+  options.command = arguments.command;
   Scene scene;
   on_every_rank(comm, [&] { scene = read_scene(arguments.scene, arguments.overrides); });
   if (scene.mesh && arguments.allow_scripts) scene.mesh->statements = Statements::any;

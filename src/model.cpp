@@ -22,51 +22,6 @@ namespace squeal
 namespace
 {
 
-/// Says how much of a slave surface does not face its master; nothing where all of it does.
-void warn_of_uncovered(const Coverage& c, const std::string& slave, const std::string& master, const char* consequence,
-                       std::vector<std::string>& sentences)
-{
-  constexpr double rounding = 1e-6; // the tolerance of coincident surfaces
-  const Vec3& at = c.uncovered_at;
-  if (c.covered < (1 - rounding) * c.area)
-    sentences.push_back(format("%.3g %% of the area of '%s' does not face '%s', most of it around (%g, %g, %g): %s",
-                               100 * (1 - c.covered / c.area), slave.c_str(), master.c_str(), at[0], at[1], at[2],
-                               consequence));
-}
-
-/// Sentences about elements that are too stiff and slave surfaces that face nothing.
-std::vector<std::string> warnings_of(const Model& model, const Scene& scene)
-{
-  std::vector<std::string> sentences;
-  if (!scene.ties.empty())
-  {
-    const TiedNodes tied = tied_nodes(model.mesh, scene);
-    for (std::size_t i = 0; i < scene.ties.size(); ++i)
-      warn_of_uncovered(tied.coverage[i], scene.ties[i].slave, scene.ties[i].master, "it is not tied there", sentences);
-  }
-  if (const long count = std::ranges::count(model.mesh.elements, Shape::tet4, &Element::shape); count > 0)
-    sentences.push_back(
-        format("%ld 4-node tetrahedra are too stiff: set Mesh.ElementOrder = 2 for 10-node ones", count));
-  for (std::size_t i = 0; i < model.coverage.size(); ++i)
-  {
-    const Contact& contact = scene.contacts[i];
-    const bool stator_is_slave = contact.slave == SlaveSide::stator;
-    warn_of_uncovered(model.coverage[i], stator_is_slave ? contact.stator : contact.rotor,
-                      stator_is_slave ? contact.rotor : contact.stator, "no contact force acts there", sentences);
-  }
-  return sentences;
-}
-
-/// The longest edge of the box round all elements [m]. Points are where the scene puts them, whatever its mesh's unit.
-double length_of(const Mesh& mesh)
-{
-  Eigen::AlignedBox3d box;
-  for (const Element& element : mesh.elements)
-    for (const int node : nodes_of(element))
-      box.extend(Eigen::Vector3d(mesh.nodes[static_cast<std::size_t>(node)].data()));
-  return box.isEmpty() ? 0 : box.sizes().maxCoeff();
-}
-
 /// C += alpha M + beta K.
 void add_damping(Structure& structure, const RayleighDamping& damping)
 {
@@ -203,9 +158,13 @@ void take_mesh(Model& model, MeshPiece piece, MPI_Comm comm)
     model.dofs.size = piece.dofs.size;
 }
 
-Model model_of_mesh(const Scene& scene, Mesh mesh, MPI_Comm comm)
+Model model_of_mesh(Scene& scene, Mesh mesh, MPI_Comm comm)
 {
   Model model;
+  std::vector<int> rotors;
+  on_rank_zero(comm, [&] { rotors = rotors_of_contacts(scene, mesh); });
+  broadcast(rotors, comm);
+  if (!scene.rotors.empty()) drive_contacts(scene, rotors);
   ContactPairs contact;
   MeshPiece piece = numbered(scene, std::move(mesh), contact, comm);
   model.structure = assemble(piece, scene, comm);
@@ -227,7 +186,7 @@ Mesh with_points(Mesh mesh, const Scene& scene)
 
 } // namespace
 
-Model build_model(const Scene& scene, MPI_Comm comm)
+Model build_model(Scene& scene, MPI_Comm comm)
 {
   Model model =
       scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, read_mesh_unless_ended(scene, comm), comm);
@@ -341,7 +300,7 @@ BrakeModel NearbyModels::at(std::span<const SceneNumber> numbers)
 {
   const Scene scene = scene_with(scene_, numbers);
   Values values;
-  for (const auto& [key, value] : numbers) values[key] = value;
+  for (const auto& [key, value] : driven_by(scene_, numbers)) values[key] = value;
   const std::set<Effect> from_own = changes(own_, values), from_last = changes(last_, values);
   last_.values.reset(); // until the next model is made
   if (from_last.contains(Effect::mesh)) piece_.reset();
@@ -372,27 +331,6 @@ Model NearbyModels::whole_at(std::span<const SceneNumber> numbers)
   model.coverage = pairs_.coverage;
   take_mesh(model, piece(scene), comm_);
   return model;
-}
-
-ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm)
-{
-  ModelSummary summary;
-  check(MatGetSize(model.structure.K, &summary.dofs, nullptr));
-  summary.elements = model.structure.elements;
-  summary.pairs = model.interface.pairs;
-  summary.coverage = model.coverage;
-  summary.ranks = ranks_of(comm);
-  const auto look = [&]
-  {
-    summary.warnings = warnings_of(model, scene);
-    summary.length = length_of(model.mesh);
-  };
-  on_rank_zero(comm, look);
-  double stiffness = 0, mass = 0;
-  check(MatNorm(model.structure.K, NORM_1, &stiffness));
-  check(MatNorm(model.structure.M, NORM_1, &mass));
-  if (mass > 0) summary.rounding_hz = 1e-6 * std::sqrt(stiffness / mass) / two_pi;
-  return summary;
 }
 
 void add_shifts(const Scene& scene, const Model& model, std::vector<double>& values, MPI_Comm comm)

@@ -105,12 +105,30 @@ std::optional<int> starts_sought(const SlidingPoint& point, const Scene& scene)
   return unstable > 0 && work <= affordable_work ? std::optional(starts) : std::nullopt;
 }
 
+namespace
+{
+
+/// Where there is no equilibrium: whether there is one without friction, which tells loads from friction. Collective.
+std::string cause_of_none(const Model& model, const Outcome& outcome, const EquilibriumOptions& options)
+{
+  Interface smooth = sharing(model.interface);
+  smooth.friction = PairFriction(FrictionLaw{});
+  const bool stands = find_equilibrium(model.structure, smooth, options).outcome.kind == OutcomeKind::converged;
+  return outcome.reason + (stands ? "; without friction there is an equilibrium: friction is too large"
+                                  : "; nor is there one without friction: a load pulls a body away from what holds it, "
+                                    "or a support is missing");
+}
+
+} // namespace
+
 SlidingPoint find_sliding(const Model& model, const ProgramOptions& options, const StageRunner& run)
 {
   SlidingPoint point{&model, {}, {}, {}, {}};
   point.equilibrium =
       run_stage(run, Stage::equilibrium, "",
                 [&] { return find_equilibrium(model.structure, model.interface, options.equilibrium); });
+  if (Outcome& outcome = point.equilibrium.outcome; outcome.kind == OutcomeKind::no_equilibrium)
+    outcome.reason = cause_of_none(model, outcome, options.equilibrium);
   return point;
 }
 

@@ -69,7 +69,11 @@ ModelSummary summary_with_doubts(const Model& model, const Scene& scene, MPI_Com
 {
   ModelSummary summary = summary_of(model, scene, comm);
   if (rank_of(comm) == 0)
-    for (const std::string& doubt : doubts_about(scene, summary.length)) summary.warnings.push_back(doubt);
+  {
+    double mass = 0;
+    for (const PartMass& part : summary.parts) mass += part.mass;
+    for (const std::string& doubt : doubts_about(scene, summary.length, mass)) summary.warnings.push_back(doubt);
+  }
   return summary;
 }
 
@@ -132,10 +136,14 @@ void print_model(const ModelSummary& model, MPI_Comm comm)
 
 } // namespace
 
-ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& results, MPI_Comm comm)
+ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results, MPI_Comm comm)
 {
   Report report;
   report.run = results.run();
+  report.program = options.program;
+  if (const int ranks = ranks_of(comm); ranks > 1) report.command = "mpirun -n " + std::to_string(ranks) + " ";
+  report.command += options.command;
+  report.place = results.place();
   const StageRunner runner = [&](Stage which, const std::function<bool()>& work)
   { return run_or_leave_out(report, which, comm, work); };
   Model model;
@@ -159,6 +167,7 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   if (point.equilibrium.outcome.kind == OutcomeKind::converged)
   {
     report.contacts = contact_resultants(model.interface, point.equilibrium.reactions, scene.contacts);
+    check(VecNorm(point.equilibrium.u, NORM_INFINITY, &report.displacement));
     report.equilibrium_probes = probe_values(model.probes, point.equilibrium.u);
     add_shifts(scene, model, report.equilibrium_probes, comm);
     for (const TightBolt& bolt : model.structure.bolts)
@@ -188,16 +197,16 @@ ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& r
   if (code != ExitCode::interrupted) check_options_used(stages_run(report), comm);
   save();
   results.publish(code == ExitCode::interrupted ? Checkpoints::kept : Checkpoints::removed);
-  print_table(report, scene, comm);
+  print_table(report, scene, options.length, comm);
   print_end(report, results, comm);
   return code;
 }
 
-void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm)
+void dry_run(Scene scene, const ProgramOptions& options, MPI_Comm comm)
 {
+  if (rank_of(comm) == 0) std::printf("# the scene, every default written out\n%s\n", resolved_scene(scene).c_str());
   const Model model = build_model(scene, comm);
-  if (rank_of(comm) == 0)
-    std::printf("# the scene, every default written out\n%s\n# the model\n", resolved_scene(scene).c_str());
+  if (rank_of(comm) == 0) std::printf("# the model\n");
   print_model(summary_with_doubts(model, scene, comm), comm);
   refuse_undriven_pairs(scene, model.interface);
   (void)check_starts(scene, model, comm);

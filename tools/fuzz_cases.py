@@ -5,6 +5,8 @@ import shutil
 import struct
 from pathlib import Path
 
+from fuzz_decks import DECKS
+
 ROOT = Path(__file__).resolve().parent.parent
 OSCILLATOR = ROOT / "inputs" / "oscillator"
 
@@ -236,4 +238,23 @@ def flips(folder, random):
     return []
 
 
-KINDS = {"scenes": scenes, "overrides": overrides, "options": options, "meshes": meshes, "matrices": matrices, "flips": flips}
+def spoil_field(text, random):
+    """Another number or word in one field of a line."""
+    lines = text.splitlines()
+    i = random.randrange(len(lines))
+    fields = lines[i].split(",") if "," in lines[i] else [lines[i][k : k + 8] for k in range(0, len(lines[i]), 8)] or [""]
+    fields[random.randrange(len(fields))] = random.choice(NUMBERS + TEXTS[:10] + ["-", "*", "1 2", "0.0", "-7", "999", " " * 8])
+    lines[i] = ("," if "," in lines[i] else "").join(fields)
+    return "\n".join(lines) + "\n"
+
+
+def decks(folder, random):
+    name = random.choice(list(DECKS))
+    text = DECKS[name]
+    for _ in range(random.randint(1, 3)):
+        text = (spoil_field if random.random() < 0.6 else spoil_lines)(text, random)
+    (folder / name).write_text(text, errors="replace")
+    return [name, "out", *random.choice([[], [], ["--length", "0.001"]])]
+
+
+KINDS = {"scenes": scenes, "overrides": overrides, "options": options, "meshes": meshes, "matrices": matrices, "flips": flips, "decks": decks}

@@ -10,8 +10,9 @@
 namespace squeal
 {
 
-/// Collective. Error: as of the mesh, the structure and the interface; no mass. Rank 0 reads and numbers the mesh.
-Model build_model(const Scene& scene, MPI_Comm comm);
+/// Gives the scene's contacts the drives of its rotors, which the mesh tells. Collective. Error: as of the mesh, the
+/// structure and the interface; no mass. Rank 0 reads and numbers the mesh.
+Model build_model(Scene& scene, MPI_Comm comm);
 
 /// How often the parts of models were made.
 struct PartsMade

@@ -3,7 +3,7 @@
 /// MUMPS's objects take theirs.
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/cycle/options.hpp"
-#include "squeal/report/stage.hpp"
+#include "squeal/report/report.hpp"
 #include "squeal/settled/motion.hpp"
 #include "squeal/study/response.hpp"
 #include "squeal/study/sweep.hpp"
@@ -22,7 +22,9 @@ struct ProgramOptions
   CycleOptions cycle;
   SettledOptions settled;
   SweepOptions sweep;
-  bool force = false; // --force: run whatever the forecast says
+  bool force = false;               // --force: run whatever the forecast says
+  TableLength length{};             // --verbose: full
+  std::string program{}, command{}; // by which the program was called
   ResponseOptions response;
 };
 

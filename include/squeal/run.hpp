@@ -16,10 +16,10 @@ enum class ExitCode : int
 
 /// Runs the chain, writes the results of each stage when it ends, and publishes the whole. Collective. Bad input and
 /// failed calls are thrown as Error on every rank; earlier results then stay.
-ExitCode run(const Scene& scene, const ProgramOptions& options, ResultsFolder& results, MPI_Comm comm);
+ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results, MPI_Comm comm);
 
 /// Checks scene and mesh and prints what the model would be; computes and writes nothing. Collective. Throws Error as
 /// run does.
-void dry_run(const Scene& scene, const ProgramOptions& options, MPI_Comm comm);
+void dry_run(Scene scene, const ProgramOptions& options, MPI_Comm comm);
 
 } // namespace squeal

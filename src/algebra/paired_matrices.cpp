@@ -65,48 +65,46 @@ SQUEAL_INLINE void add_product(const PairedRows& matrices, const double* x, doub
   }
 }
 
-/// 4 or 8 trajectories of `parts` matrices.
-template <ColumnsOf which, std::size_t parts>
+/// 4 or 8 trajectories.
+template <ColumnsOf which>
 SQUEAL_INLINE void add_lanes(const PairedRows& matrices, std::size_t lanes, const double* x, double* y)
 {
   if (lanes == 4)
-    add_product<which, parts, double, Four, 1>(matrices, x, y);
+    add_product<which, 2, double, Four, 1>(matrices, x, y);
   else if (SQUEAL_HAS_AVX512)
-    add_product<which, parts, double, Eight, 1>(matrices, x, y);
+    add_product<which, 2, double, Eight, 1>(matrices, x, y);
   else
-    add_product<which, parts, double, Four, 2>(matrices, x, y);
+    add_product<which, 2, double, Four, 2>(matrices, x, y);
 }
 
-/// 4 or 8 trajectories of both matrices, or of M alone.
-SQUEAL_SIMD void add_products(ColumnsOf which, const PairedRows& matrices, std::size_t parts, std::size_t lanes,
-                              const double* x, double* y)
+SQUEAL_SIMD void add_own(const PairedRows& matrices, std::size_t lanes, const double* x, double* y)
 {
-  if (which == ColumnsOf::own)
-    parts == 2 ? add_lanes<ColumnsOf::own, 2>(matrices, lanes, x, y)
-               : add_lanes<ColumnsOf::own, 1>(matrices, lanes, x, y);
-  else
-    parts == 2 ? add_lanes<ColumnsOf::others, 2>(matrices, lanes, x, y)
-               : add_lanes<ColumnsOf::others, 1>(matrices, lanes, x, y);
+  add_lanes<ColumnsOf::own>(matrices, lanes, x, y);
 }
 
-/// Both products, or one trajectory of both: without fused products K u of a body that moves without strain is then
-/// zero to the last bit.
-template <ColumnsOf which>
-void add(const PairedRows& matrices, std::size_t parts, std::size_t lanes, const double* x, double* y)
+SQUEAL_SIMD void add_others(const PairedRows& matrices, std::size_t lanes, const double* x, double* y)
+{
+  add_lanes<ColumnsOf::others>(matrices, lanes, x, y);
+}
+
+/// One trajectory without fused products: K u of a body that moves without strain is then zero to the last bit.
+template <ColumnsOf which> void add(const PairedRows& matrices, std::size_t lanes, const double* x, double* y)
 {
   if (lanes == 1)
     add_product<which, 1, Two, Two, 1>(matrices, x, y);
+  else if (which == ColumnsOf::own)
+    add_own(matrices, lanes, x, y);
   else
-    add_products(which, matrices, parts, lanes, x, y);
+    add_others(matrices, lanes, x, y);
 }
 
 /// Columns of other ranks in this rank's rows, ascending.
-std::vector<PetscInt> foreign_columns(const std::vector<Mat>& matrices)
+std::vector<PetscInt> foreign_columns(Mat M, Mat K)
 {
   PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(matrices.front(), &first, &last));
+  check(MatGetOwnershipRange(M, &first, &last));
   std::vector<PetscInt> columns;
-  for (Mat A : matrices)
+  for (Mat A : {M, K})
     for_each_row(A,
                  [&](PetscInt, std::span<const PetscInt> of_row, std::span<const PetscScalar>)
                  {
@@ -159,11 +157,10 @@ private:
 
 std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
 {
-  if (!is_sparse(M) || (K && !is_sparse(K))) return std::nullopt;
+  if (!is_sparse(M) || !is_sparse(K)) return std::nullopt;
   PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(M, &first, &last));
-  const std::vector<Mat> both = K ? std::vector{M, K} : std::vector{M};
-  const std::vector<PetscInt> others = foreign_columns(both);
+  const std::vector<PetscInt> others = foreign_columns(M, K);
   PairedMatrices matrices{comm_of(M), {}, {}, others.size(), exchange_of(others, M)};
   RowJoiner own(matrices.own, static_cast<std::size_t>(last - first)), foreign(matrices.foreign, others.size());
   const auto enter = [&](Mat A, PetscInt i, std::size_t which)
@@ -173,9 +170,7 @@ std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
     const PetscScalar* values = nullptr;
     check(MatGetRow(A, i, &count, &columns, &values));
     for (PetscInt k = 0; k < count; ++k)
-      if (!K && values[k] == 0)
-        continue; // most of M's, in a pattern that it shares with K
-      else if (columns[k] < first || columns[k] >= last)
+      if (columns[k] < first || columns[k] >= last)
         foreign.add(static_cast<PetscInt>(std::lower_bound(others.begin(), others.end(), columns[k]) - others.begin()),
                     which, values[k]);
       else if (columns[k] >= i)
@@ -186,22 +181,20 @@ std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
   {
     own.add(i - first, 0, 0.); // a row begins with its diagonal entry, be it zero
     enter(M, i, 0);
-    if (K) enter(K, i, 1);
+    enter(K, i, 1);
     own.end_row();
     foreign.end_row();
   }
   return matrices;
 }
 
-namespace
+void multiply_both(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> u,
+                   std::span<const Vec> Mv, std::span<const Vec> Ku)
 {
-
-/// Products of the first of `from.size()` matrices with the vectors of from[0], of the next with those of from[1], for
-/// `lanes` trajectories at once.
-void multiply(const PairedMatrices& matrices, std::size_t lanes, std::span<const std::span<const Vec>> from,
-              std::span<const std::span<const Vec>> to)
-{
-  const std::size_t rows = matrices.own.starts.size() - 1, parts = from.size(), stride = parts * lanes;
+  constexpr std::size_t parts = 2;
+  const std::array from{v, u}, to{Mv, Ku};
+  const std::size_t rows = matrices.own.starts.size() - 1, lanes = std::min<std::size_t>(8, lanes_for(v.size())),
+                    stride = parts * lanes;
   std::vector<double> x(stride * rows), y, z(stride * matrices.received);
   const RowType row(stride);
   for (std::size_t first = 0; first < from[0].size(); first += lanes)
@@ -217,12 +210,12 @@ void multiply(const PairedMatrices& matrices, std::size_t lanes, std::span<const
     for (std::size_t i = 0; i < rows; ++i)
       for (std::size_t k = 0; k < parts * count; ++k) x[i * stride + k / count * lanes + k % count] = read[k][i];
     y.assign(x.size(), 0.);
-    add<ColumnsOf::own>(matrices.own, parts, lanes, x.data(), y.data());
+    add<ColumnsOf::own>(matrices.own, lanes, x.data(), y.data());
     if (ranks_of(matrices.comm) > 1)
     {
       check(PetscSFBcastBegin(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
       check(PetscSFBcastEnd(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
-      add<ColumnsOf::others>(matrices.foreign, parts, lanes, z.data(), y.data());
+      add<ColumnsOf::others>(matrices.foreign, lanes, z.data(), y.data());
     }
     for (std::size_t i = 0; i < rows; ++i)
       for (std::size_t k = 0; k < parts * count; ++k) written[k][i] = y[i * stride + k / count * lanes + k % count];
@@ -232,21 +225,6 @@ void multiply(const PairedMatrices& matrices, std::size_t lanes, std::span<const
       check(VecRestoreArrayWrite(to[k / count][first + k % count], &written[k]));
     }
   }
-}
-
-} // namespace
-
-void multiply_both(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> u,
-                   std::span<const Vec> Mv, std::span<const Vec> Ku)
-{
-  const std::array from{v, u}, to{Mv, Ku};
-  multiply(matrices, std::min<std::size_t>(8, lanes_for(v.size())), from, to);
-}
-
-void multiply_first(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> Mv)
-{
-  const std::array from{v}, to{Mv};
-  multiply(matrices, v.size() <= 4 ? 4 : 8, from, to);
 }
 
 } // namespace squeal

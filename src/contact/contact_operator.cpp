@@ -106,9 +106,9 @@ double ContactOperator::near_share() const
   return n == 0 ? 0 : static_cast<double>(near_.entries()) / (n * n);
 }
 
-double ContactOperator::largest_eigenvalue(int iterations) const
+double ContactOperator::largest_eigenvalue(std::span<const double> roots, int iterations) const
 {
-  std::vector<double> x(size()), y(size());
+  std::vector<double> x(size()), scaled(size()), y(size());
   for (std::size_t i = 0; i < x.size(); ++i) x[i] = 1 + 0.1 * std::sin(static_cast<double>(i));
   double largest = 0;
   for (int k = 0; k < iterations; ++k)
@@ -116,9 +116,11 @@ double ContactOperator::largest_eigenvalue(int iterations) const
     const double length = std::sqrt(dot(x, x));
     if (length == 0) break;
     for (double& entry : x) entry /= length;
-    const std::span<const double> in = x;
+    std::ranges::transform(x, roots, scaled.begin(), std::multiplies<>());
+    const std::span<const double> in = scaled;
     const std::span<double> out = y;
     multiply(std::span(&in, 1), std::span(&out, 1));
+    std::ranges::transform(y, roots, y.begin(), std::multiplies<>());
     largest = dot(x, y);
     std::swap(x, y);
   }

@@ -14,15 +14,6 @@ namespace squeal
 namespace
 {
 
-/// Of the rotor's surface, by its rotation or as given; zero on the axis itself, round-off aside.
-Vec3 drive_velocity(const Contact& contact, const Vec3& at)
-{
-  if (!contact.rotation) return contact.velocity;
-  const Rotation& rotation = *contact.rotation;
-  const Vec3 arm = cross(rotation.axis, at - rotation.centre);
-  return norm(arm) > 1e-12 * (norm(at) + norm(rotation.centre)) ? rotation.rate * arm : Vec3{};
-}
-
 /// The part of `v` in the tangent plane; zero when only round-off of the normal part is left.
 Vec3 tangential(const Vec3& v, const Vec3& normal)
 {
@@ -93,6 +84,14 @@ void read_compliance(const std::filesystem::path& file, Interface& interface, MP
 }
 
 } // namespace
+
+Vec3 drive_velocity(const Contact& contact, const Vec3& at)
+{
+  if (!contact.rotation) return contact.velocity;
+  const Rotation& rotation = *contact.rotation;
+  const Vec3 arm = cross(rotation.axis, at - rotation.centre);
+  return norm(arm) > 1e-12 * (norm(at) + norm(rotation.centre)) ? rotation.rate * arm : Vec3{};
+}
 
 void check_interface(const Interface& interface, const std::string& source, MPI_Comm comm)
 {

@@ -33,7 +33,8 @@ void fixed_point(ContactWork& work, const ContactSettings& settings)
   form_products(alone);
   result.residual = residual_of(work);
   // a lower bound, close enough for a step that adapts
-  const double lambda = result.residual > settings.tolerance ? work.W.largest_eigenvalue(12) : 0;
+  const std::vector<double> ones(work.W.size(), 1.);
+  const double lambda = result.residual > settings.tolerance ? work.W.largest_eigenvalue(ones, 12) : 0;
   double rho = (settings.rho > 0 ? settings.rho : 1.5) / (lambda > 0 ? lambda : 1);
   double best = result.residual;
   while (result.residual > settings.tolerance && std::isfinite(result.residual) &&

@@ -29,7 +29,7 @@ std::string step_refusal_of(const CycleProblem& problem, int steps_per_period)
 {
   const ComplexMode& mode = problem.unstable.modes.front();
   const double h = 1 / mode.frequency_hz() / steps_per_period, theta = problem.settings.theta;
-  const std::string reason = step_refusal(problem.sliding.structure, &mode, theta, h, problem.step);
+  const std::string reason = step_refusal(&mode, theta, h, problem.step);
   return reason.empty() ? friction_refusal(problem.sliding, &mode, theta, h, problem.step, 1) : reason;
 }
 

@@ -217,6 +217,9 @@ std::string linear_text(const Report& report)
   if (report.point.equilibrium.outcome.kind != OutcomeKind::converged)
     return "nothing is known: no equilibrium was found";
   if (!has_run(report.point.modes.outcome)) return "nothing is known: the modes were not computed";
+  const bool touches = std::ranges::count(report.point.equilibrium.closed, 1) > 0;
+  if (report.point.modes.unstable_count == 0 && report.model.pairs > 0 && !touches)
+    return "nothing touches: no contact pair is closed, and friction does nothing";
   if (report.point.modes.unstable_count == 0)
     return report.point.modes.outcome.kind == OutcomeKind::converged
                ? "silent: no mode grows in the band" + beside_rest(report)
@@ -227,7 +230,36 @@ std::string linear_text(const Report& report)
   return format("the equilibrium is unstable at %.5g Hz", mode.frequency_hz());
 }
 
+/// Options that lead on from what was found; empty: it is complete, and the report page shows it.
+std::string options_to_go_on(const Report& report, const Scene& scene)
+{
+  const OutcomeKind equilibrium = report.point.equilibrium.outcome.kind, cycle = report.motion.cycle.outcome.kind;
+  const Modes& modes = report.point.modes;
+  const bool has_motion = cycle == OutcomeKind::converged || has_run(report.motion.settled.outcome);
+  const bool has_study = scene.sweep || scene.sensitivity || scene.robustness || scene.response || scene.branch;
+  if (!report.ended_by.empty()) return " --restart";
+  if (equilibrium == OutcomeKind::no_equilibrium)
+    return format(" --set friction.coefficient=%g", scene.friction.coefficient / 2);
+  if (equilibrium != OutcomeKind::converged) return " --verbose";
+  if (modes.outcome.kind == OutcomeKind::not_converged) return " -modes_solver toar";
+  if (has_motion && report.motion.cycle.multipliers.stability == Stability::undecided)
+    return " -cycle_watched_periods 200";
+  if (has_motion || has_study || !has_run(modes.outcome)) return {};
+  if (has_run(report.motion.cycle.outcome) && modes.unstable_count > 0)
+    return " --set transient.periods=400 --set cycle.start=transient";
+  if (modes.unstable_count > 0 && modes.modes.front().frequency_hz() > 0) return " --set cycle.enabled=true";
+  if (modes.unstable_count > 0 || scene.friction.coefficient == 0) return {};
+  return format(" --set sweep.key=friction.coefficient --set sweep.from=%g --set sweep.to=%g --set cycle.enabled=false",
+                scene.friction.coefficient, 2 * scene.friction.coefficient);
+}
+
 } // namespace
+
+std::string next_command(const Report& report, const Scene& scene)
+{
+  const std::string options = options_to_go_on(report, scene);
+  return options.empty() ? report.program + " report " + report.place.string() : report.command + options;
+}
 
 std::string heard(const Report& report, const Scene& scene)
 {

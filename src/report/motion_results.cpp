@@ -44,7 +44,8 @@ void add_chatter(Entry out, const History& history)
   const double chatter = sum > 0 ? std::sqrt(squares * static_cast<double>(force.size() - 2)) / 4 / sum : 0;
   out.add("normal_force_chatter", "-", "part of the normal force that alternates between steps", chatter);
   if (chatter > 0.1)
-    out.warn(format("the normal force jumps between steps by %.0f %% of its mean: impacts of the contact nodes' own "
+    out.warn(Severity::note,
+             format("the normal force jumps between steps by %.0f %% of its mean: impacts of the contact nodes' own "
                     "mass; average it over steps, or refine the contact surface",
                     100 * chatter));
 }
@@ -126,11 +127,11 @@ void add_figures(Entry out, const LimitCycle& cycle, const StepBias& bias)
 {
   const MeasuredPeriod& measured = cycle.measured;
   out.show("period", "s", "period of the cycle", cycle.orbit.period);
-  out.show("frequency_hz", "Hz", "frequency of the cycle", 1 / cycle.orbit.period);
+  out.brief("frequency_hz", "Hz", "frequency of the cycle", 1 / cycle.orbit.period);
   out.show("frequency_bias", "-", "relative error of the frequency by theta and the step", bias.frequency);
   out.add("growth_rate_bias", "-", "relative error of the mode's growth rate by theta and the step", bias.growth);
   out.show("mean_energy", "J", "mean mechanical energy over the period", measured.mean_energy);
-  out.show("mean_fluctuating_energy", "J", "mean energy about equilibrium", measured.mean_fluctuating_energy);
+  out.brief("mean_fluctuating_energy", "J", "mean energy about equilibrium", measured.mean_fluctuating_energy);
   out.show("open_pairs_mean", "-", "mean number of open pairs", measured.open_pairs_mean);
   out.show("open_pairs_max", "-", "largest number of open pairs", measured.open_pairs_max);
   out.show("stick_pairs_max", "-", "largest number of sticking pairs", measured.stick_pairs_max);
@@ -143,30 +144,33 @@ void warn_of_cycle(Entry out, const Report& report, const StepBias& bias)
 {
   const LimitCycle& cycle = report.motion.cycle;
   if (std::abs(bias.growth) > 0.1)
-    out.warn(format("theta and the step change the growth rate by %+.0f %%: the cycle's amplitude suffers",
+    out.warn(Severity::warning,
+             format("theta and the step change the growth rate by %+.0f %%: the cycle's amplitude suffers",
                     100 * bias.growth));
   if (cycle.orbit.residual > 1e-3 && report.motion.fidelity.used == CycleModel::full)
-    out.warn("a residual this large is no proof of a periodic motion");
+    out.warn(Severity::warning, "a residual this large is no proof of a periodic motion");
   const auto grow = std::ranges::count_if(report.point.modes.unstable(),
                                           [](const ComplexMode& mode) { return mode.frequency_hz() > 0; });
   if (grow > 1 && !has_run(report.attractors.outcome))
-    out.warn(format("%td modes are unstable, and other starts may lead to other motions: cycle.starts = 8 shows them, "
+    out.warn(Severity::note,
+             format("%td modes are unstable, and other starts may lead to other motions: cycle.starts = 8 shows them, "
                     "by as many motions of some hundred periods",
                     grow));
   if (cycle.multipliers.stability == Stability::undecided)
-    out.warn("whether a vibration settles on this cycle is undecided: " + cycle.multipliers.would_decide);
+    out.warn(Severity::warning,
+             "whether a vibration settles on this cycle is undecided: " + cycle.multipliers.would_decide);
   if (cycle.multipliers.stability == Stability::not_examined)
-    out.warn("whether this cycle attracts was not examined: -cycle_multipliers 20 does");
+    out.warn(Severity::warning, "whether this cycle attracts was not examined: -cycle_multipliers 20 does");
 }
 
 void add_reached(Entry out, const ReachedMotion& motion)
 {
-  out.show("kind", "what the motion does; one whose energy has a trend is unsettled", motion.kind);
+  out.brief("kind", "what the motion does; one whose energy has a trend is unsettled", motion.kind);
   out.show("mean_fluctuating_energy", "J", "mean energy about equilibrium", motion.energy.value);
   out.error("energy_error", "its error bar", motion.energy.error);
-  out.show("frequency_hz", "Hz", "frequency of the mode's coordinate that moves most", motion.frequency.value);
+  out.brief("frequency_hz", "Hz", "frequency of the mode's coordinate that moves most", motion.frequency.value);
   out.error("frequency_error", "its error bar", motion.frequency.error);
-  out.show("starts", "-", "numbers of the starts that lead to this motion, from 0", motion.starts);
+  out.brief("starts", "-", "numbers of the starts that lead to this motion, from 0", motion.starts);
 }
 
 void add_line(Entry out, const Line& line)
@@ -221,7 +225,8 @@ void add_transient(Entry out, const Report& report)
   of_mode.show("growth_rate_bias", "-", "relative error of the growth rate by theta and the step", bias.growth);
   of_mode.show("frequency_bias", "-", "relative error of the frequency by theta and the step", bias.frequency);
   add_chatter(out, run.history);
-  out.show("energy_defect_max", "-", "largest defect of the energy identity over the energy", run.energy_defect_max);
+  out.check(run.energy_defect_max <= 1e-8, "energy_defect_max", "-",
+            "largest defect of the energy identity over the energy", run.energy_defect_max);
   if (out.has(!run.history.joint_work.empty()))
     out.add("joint_work", "J", "work of the pairs without a drive of each contact, below zero: what they take",
             run.history.joint_work);
@@ -231,12 +236,14 @@ void add_transient(Entry out, const Report& report)
           run.contact_steps_as_one);
   out.add("seconds_per_step", "s", "time of a step", run.seconds_per_step);
   if (std::abs(bias.growth) > 0.1)
-    out.warn(format("theta and the step change the growth rate by %+.0f %%: more steps a period, or theta = 1/2",
+    out.warn(Severity::warning,
+             format("theta and the step change the growth rate by %+.0f %%: more steps a period, or theta = 1/2",
                     100 * bias.growth));
   if (std::abs(fit - predicted) > 0.01 * std::abs(predicted))
-    out.warn("the fitted growth rate is not the predicted one: other motion than the mode is in the start");
+    out.warn(Severity::note,
+             "the fitted growth rate is not the predicted one: other motion than the mode is in the start");
   if (run.energy_defect_max > 1e-8)
-    out.warn("the energy identity of the scheme is missed: tighten -transient_contact_tolerance");
+    out.warn(Severity::warning, "the energy identity of the scheme is missed: tighten -transient_contact_tolerance");
 }
 
 void add_coarse(Entry out, const Report& report)
@@ -257,7 +264,8 @@ void add_cycle(Entry out, const Report& report)
   const bool is_found = cycle.outcome.kind == OutcomeKind::converged;
   add_figures(is_found ? out : out.hidden(), cycle, bias);
   out.add("mode", "-", "place of the followed mode in `modes.modes`, from 0", report.motion.followed.index);
-  out.show("residual_full", "-", "distance of end and start over that from equilibrium", cycle.orbit.residual);
+  out.check(is_found, "residual_full", "-", "distance of end and start over that from equilibrium",
+            cycle.orbit.residual);
   out.show("tolerance", "-", "largest residual of a cycle; 0: `accuracy` decided instead", cycle.tolerance);
   out.add("residual_projected", "-", "residual on the subspace; `null`: not tried",
           cycle.convergence.residual_projected);
@@ -282,7 +290,7 @@ void add_settled(Entry out, const Report& report)
   const ExaminedMotion& motion = settled.examined;
   const auto& probes = out.scene().probes;
   const bool of_probe = motion.followed >= 0;
-  out.show("kind", "kind of the motion", motion.verdict.kind);
+  out.brief("kind", "kind of the motion", motion.verdict.kind);
   out.add("between", "text", "of an undecided one: between what", motion.verdict.between);
   out.add("would_decide", "text", "of an undecided one: what would decide", motion.verdict.would_decide);
   out.show("periods", "-", "periods that were integrated", motion.periods());
@@ -322,7 +330,7 @@ void add_fidelity(Entry whole, const Fidelity& fidelity)
   const bool is_chosen = fidelity.asked != CycleModel::full; // by squeal, or by the scene
   const Entry out = is_chosen ? whole : whole.hidden();
   out.show("asked", "the scene's `fidelity`", fidelity.asked);
-  out.show("used", "model on which the cycle was sought", fidelity.used);
+  out.brief("used", "model on which the cycle was sought", fidelity.used);
   out.text("reason", "why that model was used", fidelity.reason);
   if (!out.has(is_chosen)) return;
   out.show("accuracy", "-", "the scene's `accuracy`", fidelity.accuracy);
@@ -341,10 +349,14 @@ void add_fidelity(Entry whole, const Fidelity& fidelity)
   reduced.show("reduced_periods", "-", "periods of the reduced model integrated", fidelity.reduced_periods);
   out.show("full_periods", "-", "periods of the full model integrated", fidelity.full_periods);
   const Entry errors = out.group("error_estimates");
-  errors.show("frequency", "-", "relative error of the frequency by the model", fidelity.frequency_error);
-  errors.show("energy", "-", "relative error of the mean fluctuating energy by the model", fidelity.energy_error);
-  errors.show("step_frequency", "-", "relative error of the frequency by the step", fidelity.step_frequency_error);
-  errors.show("step_energy", "-", "relative error of that energy by the step", fidelity.step_energy_error);
+  errors.check(!(fidelity.frequency_error > fidelity.accuracy), "frequency", "-",
+               "relative error of the frequency by the model", fidelity.frequency_error);
+  errors.check(!(fidelity.energy_error > fidelity.accuracy), "energy", "-",
+               "relative error of the mean fluctuating energy by the model", fidelity.energy_error);
+  errors.check(!(fidelity.step_frequency_error > fidelity.accuracy), "step_frequency", "-",
+               "relative error of the frequency by the step", fidelity.step_frequency_error);
+  errors.check(!(fidelity.step_energy_error > fidelity.accuracy), "step_energy", "-",
+               "relative error of that energy by the step", fidelity.step_energy_error);
   const Entry seconds = out.group("seconds");
   seconds.add("reduction", "s", "time to make the reduced model", fidelity.reduction_seconds);
   seconds.add("reduced_cycles", "s", "time on the reduced model", fidelity.reduced_seconds);

@@ -93,11 +93,16 @@ void Entry::text(const std::string& name, const char* meaning, const std::string
   if (has(!value.empty())) show(name, "text", meaning, value);
 }
 
-void Entry::warn(const std::string& sentence) const
+void Entry::warn(Severity severity, const std::string& sentence) const
 {
   if (is_example() || !shown_) return;
-  if (!at_.part("warnings")) add("warnings", "text", "", Json::array());
-  std::ranges::find(at_.parts, "warnings", &Result::name)->value.push_back(sentence);
+  const auto push = [&](const char* name, const std::string& text)
+  {
+    if (!at_.part(name)) add(name, "text", "", Json::array());
+    std::ranges::find(at_.parts, name, &Result::name)->value.push_back(text);
+  };
+  push("warnings", sentence);
+  push("severities", word(severity));
 }
 
 void Entry::mean(const std::string& name, const std::string& unit, const char* meaning, const MeanValue& value) const

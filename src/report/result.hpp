@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <list>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,16 @@ namespace squeal
 {
 
 using Json = nlohmann::ordered_json;
+
+/// How much a warning bears on the answer.
+enum class Severity
+{
+  note,    // what the numbers leave open
+  warning, // a number may be off
+  severe,  // the answer may be of something else
+};
+
+template <> inline constexpr std::array words_of<Severity> = {"note", "warning", "severe"};
 
 /// A value, a group of results, or a list of groups.
 struct Result
@@ -41,6 +52,8 @@ struct Result
   std::list<Result> parts{};
   Words words{}; // of which the value is one
   Place place = Place::none;
+  bool is_brief = false;        // the short table shows it, too
+  std::optional<bool> passed{}; // of a check
 
   /// The part of this name; null: there is none.
   const Result* part(const std::string& of) const;
@@ -83,6 +96,22 @@ public:
     return result;
   }
 
+  /// A result that the short table shows as well.
+  template <class... Description> Result& brief(const std::string& name, const Description&... description) const
+  {
+    Result& result = show(name, description...);
+    result.is_brief = shown_;
+    return result;
+  }
+
+  /// A result that tells whether others can be trusted; the short table names those that did not pass.
+  template <class... Description>
+  void check(bool passed, const std::string& name, const Description&... description) const
+  {
+    Result& result = show(name, description...);
+    if (shown_) result.passed = passed;
+  }
+
   /// This group, filled with results that the table leaves out and that bring no warnings.
   Entry hidden() const;
 
@@ -93,7 +122,7 @@ public:
   void text(const std::string& name, const char* meaning, const std::string& value) const;
 
   /// A sentence for whoever would be misled by the numbers.
-  void warn(const std::string& sentence) const;
+  void warn(Severity severity, const std::string& sentence) const;
 
   /// A mean with its error bar.
   void mean(const std::string& name, const std::string& unit, const char* meaning, const MeanValue& value) const;

@@ -30,15 +30,23 @@ void add_coverage(Entry out, const Contact& contact, const Coverage& coverage)
   out.add("offset", "m", "largest tangential distance of the places where a pair's two forces act", coverage.offset);
 }
 
+void add_part_mass(Entry out, const PartMass& part)
+{
+  out.brief("name", "text", "part of the scene", part.name);
+  out.brief("mass", "kg", "mass of its elements", part.mass);
+}
+
 void add_model(Entry out, const Report& report)
 {
   const ModelSummary& model = report.model;
   const StepCosts& costs = report.motion.cycle.costs;
   const double factor = std::max(report.transient.factor_seconds, costs.factor_seconds);
-  out.show("dofs", "-", "degrees of freedom", model.dofs);
-  out.show("elements", "-", "finite elements", model.elements);
-  out.show("pairs", "-", "contact pairs", model.pairs);
-  out.show("ranks", "-", "MPI ranks", model.ranks);
+  out.brief("dofs", "-", "degrees of freedom", model.dofs);
+  out.brief("elements", "-", "finite elements", model.elements);
+  out.brief("pairs", "-", "contact pairs", model.pairs);
+  out.brief("ranks", "-", "MPI ranks", model.ranks);
+  if (out.has(model.length > 0)) out.brief("size", "m", "sides of the box round the mesh", model.size);
+  out.list("parts", add_part_mass, model.parts);
   out.add("memory_bytes", "bytes", "largest memory that was resident, all ranks together", model.memory_bytes);
   out.add("rounding_hz", "Hz", "slower modes count as rigid: 1e-6 sqrt(norm(K)/norm(M))/2 pi", model.rounding_hz);
   out.list("contacts", add_coverage, out.scene().contacts, model.coverage);
@@ -57,6 +65,7 @@ void add_head(Entry out, const Report& report)
           report.exit_code < 0 ? Json() : Json(report.exit_code));
   out.add("title", "text", "the scene's title", out.scene().title);
   out.add("scene", "path", "the scene file", out.scene().file.string());
+  out.add("next", "text", "a command that goes on from here", next_command(report, out.scene()));
   out.add("heard", "text", "what is heard, and whether it lasts, in one sentence", heard(report, out.scene()));
 }
 
@@ -98,12 +107,13 @@ Result filled(const Report& report, const Scene& scene, Content content)
   add_head(out, report);
   const Entry model = out.group(word(Stage::model));
   add_model(model, report);
-  for (const std::string& sentence : report.model.warnings) model.warn(sentence);
+  for (const std::string& sentence : report.model.warnings) model.warn(Severity::warning, sentence);
   if (out.is_example())
   {
     const Entry any = out.group("<stage>");
     add_outcome(any, {});
     any.add("warnings", "text", "sentences for whoever the numbers would mislead; also of `model`", Json::array());
+    any.add("severities", "word", "how much each bears on the answer: `note`, `warning`, `severe`", Json::array());
   }
   for (std::size_t i = 0; i < add_found.size(); ++i)
   {

@@ -22,17 +22,18 @@ std::vector<double> closed_reactions(const Equilibrium& equilibrium)
 
 void add_contact(Entry out, const Contact& contact, const ContactResultant& resultant)
 {
-  out.show("rotor", "text", "the contact's rotor", contact.rotor);
-  out.show("stator", "text", "the contact's stator", contact.stator);
-  out.show("normal_force_sum", "N", "sum of its normal reactions", resultant.normal_force);
+  out.brief("stator", "text", "the contact's stator", contact.stator);
+  out.brief("rotor", "text", "the contact's rotor", contact.rotor);
+  out.brief("normal_force_sum", "N", "sum of its normal reactions", resultant.normal_force);
   if (out.has(contact.rotation.has_value()))
-    out.show("torque", "N m", "torque with which it brakes its rotation", resultant.torque);
+    out.brief("torque", "N m", "torque with which it brakes its rotation", resultant.torque);
+  out.brief("closed_share", "-", "share of its pairs that are closed", resultant.closed_share);
 }
 
 void add_bolt(Entry out, const BoltResult& bolt)
 {
-  out.show("name", "text", "name of the bolt", bolt.name);
-  out.show("tension", "N", "its tension at equilibrium", bolt.tension);
+  out.brief("name", "text", "name of the bolt", bolt.name);
+  out.brief("tension", "N", "its tension at equilibrium", bolt.tension);
   out.show("shortening", "m", "by which its shank was shortened", bolt.shortening);
 }
 
@@ -51,11 +52,14 @@ void add_history(Entry out, const LoadHistory& history)
 
 void add_mode(Entry out, const ComplexMode& mode)
 {
-  out.show("frequency_hz", "Hz", "frequency of a mode; the largest growth rate comes first", mode.frequency_hz());
-  out.show("growth_rate", "1/s", "real part of its eigenvalue", mode.growth_rate());
-  out.show("damping_ratio", "-", "minus the real part over the modulus of the eigenvalue", mode.damping_ratio());
+  const bool grows = is_unstable(mode.lambda);
+  out.show("frequency_hz", "Hz", "frequency of a mode; the largest growth rate comes first", mode.frequency_hz())
+      .is_brief = grows;
+  out.show("growth_rate", "1/s", "real part of its eigenvalue", mode.growth_rate()).is_brief = grows;
+  out.show("damping_ratio", "-", "minus the real part over the modulus of the eigenvalue", mode.damping_ratio())
+      .is_brief = grows;
   out.show("backward_error", "-", "backward error in the full problem", mode.backward_error);
-  out.show("unstable", "switch", "it grows: the real part exceeds 1e-8 of the modulus", is_unstable(mode.lambda));
+  out.show("unstable", "switch", "it grows: the real part exceeds 1e-8 of the modulus", grows);
 }
 
 /// The meaning of a count that disagrees, and its remedy.
@@ -73,13 +77,15 @@ const char* count_remedy(const Modes& modes)
 void warn_of_modes(Entry out, const Modes& modes, const ModelSummary& model)
 {
   if (modes.modes.empty() && modes.outcome.kind == OutcomeKind::converged)
-    out.warn(
-        format("no mode lies below %g Hz", modes.band) +
-        (model.length > 0
-             ? format(": is mesh.scale right (the model is %.3g m long), and are moduli and densities?", model.length)
-             : ": is modes.band right, and are the units of M and K?"));
+    out.warn(Severity::severe,
+             format("no mode lies below %g Hz", modes.band) +
+                 (model.length > 0
+                      ? format(": is mesh.scale right (the model is %.3g m long), and are moduli and densities?",
+                               model.length)
+                      : ": is modes.band right, and are the units of M and K?"));
   if (model.rounding_hz > 0.001 * modes.band)
-    out.warn(format("modes below %.3g Hz are lost in rounding beside the stiffest entry of K: make what is rigid "
+    out.warn(Severity::warning,
+             format("modes below %.3g Hz are lost in rounding beside the stiffest entry of K: make what is rigid "
                     "a rigid body, not a stiff spring",
                     model.rounding_hz));
   constexpr double narrow = 1e-4; // of |lambda|: less than a mesh or a damping value is known to
@@ -87,14 +93,16 @@ void warn_of_modes(Entry out, const Modes& modes, const ModelSummary& model)
       std::ranges::count_if(modes.modes, [](const ComplexMode& mode)
                             { return std::abs(mode.growth_rate()) < narrow * std::abs(mode.lambda); });
   if (on_the_edge > 0)
-    out.warn(format("%td of the modes are within 0.01 %% of the threshold: mesh and damping decide their sign",
+    out.warn(Severity::note,
+             format("%td of the modes are within 0.01 %% of the threshold: mesh and damping decide their sign",
                     on_the_edge));
   if (modes.routes_disagree)
     out.warn(
+        Severity::warning,
         "the two routes disagree on the number of unstable modes: raise modes.real_modes or modes.residual_passes");
   if (modes.count.certified_by == Certificate::none && modes.count.expected != modes.count.found)
-    out.warn(format("%d pairs were found where %d are expected, %s", modes.count.found, modes.count.expected,
-                    count_remedy(modes)));
+    out.warn(Severity::severe, format("%d pairs were found where %d are expected, %s", modes.count.found,
+                                      modes.count.expected, count_remedy(modes)));
 }
 
 } // namespace
@@ -116,12 +124,14 @@ void add_equilibrium(Entry whole, const Report& report)
   double sum = 0;
   for (const double force : forces) sum += force;
   out.show("iterations", "-", "iterations of the contact status", found.outcome.iterations);
-  out.show("closed", "-", "contact pairs that are closed", forces.size());
+  out.brief("closed", "-", "contact pairs that are closed", forces.size());
   out.show("normal_force_sum", "N", "sum of the normal reactions", sum);
   out.show("normal_force_min", "N", "smallest normal reaction of a closed pair", forces.empty() ? 0 : *least);
   out.show("normal_force_max", "N", "largest normal reaction of a pair", forces.empty() ? 0 : *greatest);
-  out.show("residual", "-", "largest natural map of a pair over the largest reaction", found.outcome.residual);
-  out.show("force_residual", "-", "norm of K u - F - B' r over the norm of F", found.force_residual);
+  const bool is_found = found.outcome.kind == OutcomeKind::converged;
+  out.check(is_found, "residual", "-", "largest natural map of a pair over the largest reaction",
+            found.outcome.residual);
+  out.check(is_found, "force_residual", "-", "norm of K u - F - B' r over the norm of F", found.force_residual);
   (found.auxiliary_stiffness > 0 ? out : out.hidden())
       .show("auxiliary_stiffness", "N/m", "springs across pairs that alone hold a body; 0: none",
             found.auxiliary_stiffness);
@@ -131,10 +141,16 @@ void add_equilibrium(Entry whole, const Report& report)
   out.list("contacts", add_contact, out.scene().contacts, report.contacts);
   if (out.has(!report.bolts.empty())) out.list("bolts", add_bolt, report.bolts);
   add_probes(out, "probes", "displacement of the probe at equilibrium", report.equilibrium_probes);
+  if (report.model.length > 0 && report.displacement > report.model.length)
+    out.warn(Severity::severe,
+             format("the loads move the structure by %.3g m, which is longer than itself: one pulls a "
+                    "body away from what holds it; turn it round, or add a support",
+                    report.displacement));
   if (found.uniqueness == Uniqueness::not_assured)
-    out.warn("with this much friction other equilibria may exist beside this one");
+    out.warn(Severity::note, "with this much friction other equilibria may exist beside this one");
   if (report.model.pairs > 0 && found.outcome.kind == OutcomeKind::converged && forces.empty())
-    out.warn("no contact pair is closed: nothing touches, and friction does nothing. Is the gap too large, or does a "
+    out.warn(Severity::severe,
+             "no contact pair is closed: nothing touches, and friction does nothing. Is the gap too large, or does a "
              "load pull the bodies apart?");
 }
 
@@ -143,12 +159,14 @@ void add_modes(Entry out, const Report& report)
   const Modes& modes = report.point.modes;
   const ModeCount& count = modes.count;
   const bool is_certified = count.certified_by != Certificate::none;
-  out.show("unstable_count", "-", "modes that grow", modes.unstable_count);
-  out.show("band_hz", "Hz", "every mode below is reported", modes.band);
+  out.brief("unstable_count", "-", "modes that grow", modes.unstable_count);
+  out.brief("band_hz", "Hz", "every mode below is reported", modes.band);
   out.show("method", "route to the modes", modes.method);
   out.add("iterations", "-", "iterations of the eigensolver", modes.outcome.iterations);
-  out.show("residual", "-", "largest backward error of a reported mode", modes.outcome.residual);
-  out.show("count_check", "text", "numbers of modes by either route and by inertia", modes.count_check);
+  out.check(modes.outcome.kind == OutcomeKind::converged, "residual", "-", "largest backward error of a reported mode",
+            modes.outcome.residual);
+  out.check(is_certified || count.expected == count.found, "count_check", "text",
+            "numbers of modes by either route and by inertia", modes.count_check);
   out.add("count_certified_by", "word", "`inertia`; `all pairs`: the problem was solved whole; `null`: not certified",
           is_certified ? Json(word(count.certified_by)) : Json());
   out.add("count_expected", "-", "number of pairs below `count_frequency_hz` by that count", count.expected);
@@ -168,10 +186,10 @@ void add_estimate(Entry out, const Report& report)
 {
   const Estimate& estimate = followed_estimate(report);
   const bool has_balance = estimate.outcome.kind == OutcomeKind::balance; // else there is no amplitude, not one of zero
-  out.show("amplitude", "m", "amplitude of the balance; the mode's largest entry is 1",
-           has_balance ? Json(estimate.amplitude) : Json());
+  out.brief("amplitude", "m", "amplitude of the balance; the mode's largest entry is 1",
+            has_balance ? Json(estimate.amplitude) : Json());
   out.show("mean_energy", "J", "mean energy of the vibration there", has_balance ? Json(estimate.mean_energy) : Json());
-  out.show("lift_off_amplitude", "m", "amplitude at which the first pair lifts off", estimate.lift_off_amplitude);
+  out.brief("lift_off_amplitude", "m", "amplitude at which the first pair lifts off", estimate.lift_off_amplitude);
   out.show("reversal_amplitude", "m", "amplitude at which sliding first reverses", estimate.reversal_amplitude);
   if (out.has(std::isfinite(estimate.slip_amplitude)))
     out.show("slip_amplitude", "m", "amplitude at which the first pair that sticks slips", estimate.slip_amplitude);
@@ -184,14 +202,18 @@ void add_estimate(Entry out, const Report& report)
   curve.add("amplitude", "m", "amplitudes of the curve", estimate.curve_amplitude);
   curve.add("friction_rate", "1/s", "power of friction over energy there", estimate.curve_rate);
   const double lift_off = estimate.lift_off_amplitude;
+  if (report.motion.cycle.outcome.kind == OutcomeKind::converged || has_run(report.motion.settled.outcome))
+    return; // the motion itself is known
   if (estimate.outcome.kind == OutcomeKind::no_balance && std::isfinite(lift_off))
-    out.warn(format("no amplitude is predicted; start = \"estimate\" is first lift-off times %g, %.5g m",
+    out.warn(Severity::note,
+             format("no amplitude is predicted; start = \"estimate\" is first lift-off times %g, %.5g m",
                     lift_off_multiple, lift_off_multiple * lift_off));
   if (has_balance && estimate.amplitude > 3 * lift_off)
-    out.warn(format("%.2g times first lift-off: the cycle itself may be far smaller, down to that",
-                    estimate.amplitude / lift_off));
+    out.warn(Severity::note, format("%.2g times first lift-off: the cycle itself may be far smaller, down to that",
+                                    estimate.amplitude / lift_off));
   if (has_balance && estimate.reversal_amplitude < lift_off)
-    out.warn("slip reverses before anything lifts off: pairs will stick, and the cycle may be twice as large");
+    out.warn(Severity::note,
+             "slip reverses before anything lifts off: pairs will stick, and the cycle may be twice as large");
 }
 
 } // namespace squeal

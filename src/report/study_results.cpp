@@ -18,10 +18,10 @@ void add_peak(Entry out, const std::string& excitation, const std::string& probe
   const auto peak = std::ranges::max_element(receptance, {}, [](const auto& value) { return std::abs(value); });
   const bool has_peak = peak != receptance.end();
   const auto place = static_cast<std::size_t>(peak - receptance.begin());
-  out.show("excitation", "text", "probe that is driven", excitation);
-  out.show("probe", "text", "probe that is read", probe);
-  out.show("frequency_hz", "Hz", "frequency at which it moves most", has_peak ? frequency_hz[place] : 0);
-  out.show("receptance", "m/N", "displacement over force there", has_peak ? std::abs(*peak) : 0);
+  out.brief("excitation", "text", "probe that is driven", excitation);
+  out.brief("probe", "text", "probe that is read", probe);
+  out.brief("frequency_hz", "Hz", "frequency at which it moves most", has_peak ? frequency_hz[place] : 0);
+  out.brief("receptance", "m/N", "displacement over force there", has_peak ? std::abs(*peak) : 0);
 }
 
 /// The full model's cycle beside a point of a reduced branch.
@@ -73,8 +73,8 @@ void add_branch_point(Entry out, const BranchPoint& point)
 
 void add_event(Entry out, const BranchEvent& event)
 {
-  out.show("kind", "what happens along the branch", event.kind);
-  out.show("parameter", "unit of the key", "where it happens", event.parameter);
+  out.brief("kind", "what happens along the branch", event.kind);
+  out.brief("parameter", "unit of the key", "where it happens", event.parameter);
   out.error("error", "error; other phases of the steps move events of contact by up to four times it", event.error);
   out.show("frequency_hz", "Hz", "of the cycle there; at a Hopf point of the mode", 1 / event.period);
   out.add("mean_fluctuating_energy", "J", "of the cycle there; 0 at a Hopf point", event.mean_fluctuating_energy);
@@ -98,8 +98,8 @@ void add_range(Entry out, const ParameterRange& range)
 /// An eigenvalue as growth rate and frequency.
 void add_eigenvalue(Entry out, const char* meaning, std::complex<double> lambda)
 {
-  out.show("growth_rate", "1/s", meaning, lambda.real());
-  out.show("frequency_hz", "Hz", "its frequency", lambda.imag() / two_pi);
+  out.brief("growth_rate", "1/s", meaning, lambda.real());
+  out.brief("frequency_hz", "Hz", "its frequency", lambda.imag() / two_pi);
 }
 
 void add_derivative(Entry out, const NumberDerivative& derivative)
@@ -134,7 +134,7 @@ void add_share(Entry out, const EnergyShare& share)
 
 void add_change(Entry out, const Change& change, const ChangeEffect& effect)
 {
-  out.show("probe", "text", "where a change is proposed", change.probe);
+  out.brief("probe", "text", "where a change is proposed", change.probe);
   out.show("mass", "kg", "mass that is added", change.mass);
   out.show("damping", "N s/m", "dashpot that is added", change.damping);
   out.show("stiffness", "N/m", "spring that is added", change.stiffness);
@@ -164,7 +164,7 @@ void add_causes(Entry out, const ModeCauses& causes)
   out.show("turning_friction_powers", "1/s", "power as friction turns, as damping", causes.turning_friction_powers);
   out.show("damping_power", "1/s", "power that dampers, Rayleigh damping and loss factors take", causes.damping_power);
   out.add("power_defect", "1/s", "all of these less twice the growth rate: rounding", causes.defect);
-  out.show("strongest", "text", "numbers of which 1 % moves the growth rate most", strongest(causes.numbers));
+  out.brief("strongest", "text", "numbers of which 1 % moves the growth rate most", strongest(causes.numbers));
   out.list("derivatives", add_derivative, causes.numbers);
   out.list("probes", add_probe_derivative, out.scene().probes, causes.probes);
   out.list("shares", add_share, causes.shares);
@@ -187,7 +187,8 @@ void add_response(Entry out, const Report& report)
   out.show("from_hz", "Hz", "lowest frequency", frequency.empty() ? 0 : frequency.front());
   out.show("to_hz", "Hz", "highest frequency", frequency.empty() ? 0 : frequency.back());
   out.show("count", "-", "number of frequencies", frequency.size());
-  out.show("residual", "-", "residual force over a unit force", response.outcome.residual);
+  out.check(response.outcome.kind == OutcomeKind::converged, "residual", "-", "residual force over a unit force",
+            response.outcome.residual);
   out.show("change", "-", "relative change of a receptance by the last correction", response.change);
   out.add("parts", "-", "parts of the band, each with a basis of its own", response.parts);
   out.show("shapes", "-", "shapes of the largest basis", response.shapes);
@@ -200,10 +201,12 @@ void add_response(Entry out, const Report& report)
   if (out.is_example()) add_peak(peaks.group(""), "", "", {}, {});
   const Modes& modes = report.point.modes;
   if (modes.unstable_count > 0)
-    out.warn(format("%d of the modes are unstable: no vibration settles on these responses, and no rig measures them",
+    out.warn(Severity::note,
+             format("%d of the modes are unstable: no vibration settles on these responses, and no rig measures them",
                     modes.unstable_count));
   else if (modes.outcome.kind != OutcomeKind::converged || modes.band < (frequency.empty() ? 0 : frequency.back()))
-    out.warn("whether all modes of this band are stable is not known, without which no rig measures these responses: "
+    out.warn(Severity::note,
+             "whether all modes of this band are stable is not known, without which no rig measures these responses: "
              "give modes.band its highest frequency");
 }
 
@@ -214,8 +217,8 @@ void add_branch(Entry out, const Report& report)
   const Branch& branch = found.branch;
   const BranchReduction none{};
   add_key(out, "number that changes along the branch", settings.key);
-  out.show("from", "unit of the key", "one end of its range", settings.from);
-  out.show("to", "unit of the key", "the other end", settings.to);
+  out.brief("from", "unit of the key", "one end of its range", settings.from);
+  out.brief("to", "unit of the key", "the other end", settings.to);
   out.show("periods_integrated", "-", "periods integrated", branch.periods);
   out.show("tangent_columns", "-", "columns of the tangent, those of the multipliers included", branch.columns);
   const Entry ends = out.group("ends");

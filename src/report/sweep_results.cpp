@@ -47,7 +47,7 @@ std::vector<Track> unstable_tracks(const Sweep& sweep)
 /// Where a point, a threshold or a track is.
 void add_place(Entry out, const char* meaning, const SweptPlace& place)
 {
-  out.show("values", "units of the keys", meaning, place.values);
+  out.brief("values", "units of the keys", meaning, place.values);
   out.show("direction", "-", "1: rotation as in the scene, -1: reversed", place.reversed ? -1 : 1);
 }
 
@@ -102,8 +102,8 @@ void add_track(Entry out, const Track& track)
   out.show("points", "-", "points in that direction where it was found", track.points);
   out.show("unstable_points", "-", "those of them where it is unstable", track.unstable);
   out.show("least_mac", "-", "its least MAC", track.least_mac);
-  out.show("greatest_growth_rate", "1/s", "its greatest growth rate", track.mode.lambda.real());
-  out.show("frequency_hz", "Hz", "its frequency there", frequency_hz_of(track.mode.lambda));
+  out.brief("greatest_growth_rate", "1/s", "its greatest growth rate", track.mode.lambda.real());
+  out.brief("frequency_hz", "Hz", "its frequency there", frequency_hz_of(track.mode.lambda));
   add_place(out, "where that is", track.place);
 }
 
@@ -113,8 +113,8 @@ void add_threshold(Entry out, const Threshold& threshold)
             {threshold.values, threshold.reversed});
   out.show("error", "unit of the key", "length of the interval that holds the first value", threshold.error);
   out.show("track", "-", "number of the mode", threshold.track);
-  out.show("frequency_hz", "Hz", "its frequency there", threshold.frequency_hz);
-  out.show("change", "-", "change of the number of unstable modes with a rising number", threshold.change);
+  out.brief("frequency_hz", "Hz", "its frequency there", threshold.frequency_hz);
+  out.brief("change", "-", "change of the number of unstable modes with a rising number", threshold.change);
 }
 
 /// A mode of a point; null: the point has none.
@@ -147,9 +147,9 @@ double part_of(const std::vector<double>& ascending, double part)
 void add_probability(Entry out, const char* meaning, const Probability& probability)
 {
   out.show("unstable_samples", "-", meaning, probability.count);
-  out.show("probability", "-", "their part of all with an equilibrium", probability.estimate());
-  out.show("lower", "-", "lower end of its interval", probability.lower);
-  out.show("upper", "-", "upper end of its interval", probability.upper);
+  out.brief("probability", "-", "their part of all with an equilibrium", probability.estimate());
+  out.brief("lower", "-", "lower end of its interval", probability.lower);
+  out.brief("upper", "-", "upper end of its interval", probability.upper);
 }
 
 void add_random_mode(Entry out, const RobustMode& mode)
@@ -158,7 +158,7 @@ void add_random_mode(Entry out, const RobustMode& mode)
   out.add("mode", "-", "number of a mode of the medians; -1: modes like none of them", mode.number);
   if (out.has(mode.number >= 0))
   {
-    out.show("median_frequency_hz", "Hz", "its frequency at the medians", frequency_hz_of(mode.lambda));
+    out.brief("median_frequency_hz", "Hz", "its frequency at the medians", frequency_hz_of(mode.lambda));
     out.add("median_growth_rate", "1/s", "its growth rate there", mode.lambda.real());
   }
   add_probability(out, "samples where it is unstable", mode.unstable);
@@ -265,13 +265,13 @@ void add_robustness(Entry out, const Report& report)
   const Robustness& robustness = report.robustness;
   const auto is_wrong = [](const RobustCheck& check)
   { return check.known && check.unstable != check.unstable_reduced; };
-  out.show("samples", "-", "number of samples", robustness.samples.size());
+  out.brief("samples", "-", "number of samples", robustness.samples.size());
   out.show("confidence", "-", "confidence of the intervals", out.scene().robustness->confidence);
   add_probability(out.group("any"), "samples with an unstable mode", robustness.any);
   out.show("basis_shapes", "-", "shapes of the basis", robustness.basis);
   out.show("growth_error", "-", "error of growth rates over abs(lambda) in the checks", robustness.outcome.residual);
-  out.show("wrong_verdicts", "-", "checks with another number of unstable modes",
-           std::ranges::count_if(robustness.checks, is_wrong));
+  out.check(std::ranges::none_of(robustness.checks, is_wrong), "wrong_verdicts", "-",
+            "checks with another number of unstable modes", std::ranges::count_if(robustness.checks, is_wrong));
   out.list("modes", add_random_mode, robustness.modes);
   out.list("numbers", add_number, out.scene().uncertain, robustness.correlation);
   out.list("checks", add_check, robustness.checks);

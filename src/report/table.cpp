@@ -1,4 +1,5 @@
-/// The table a person reads at the end of a run: a row for each result, and the answer in the last one.
+/// The table a person reads at the end of a run: the answer, a row for each stage, and the next command. In full, a row
+/// for each result stands before.
 #include "results.hpp"
 
 #include <cctype>
@@ -15,7 +16,7 @@ using Kind = Result::Kind;
 using Place = Result::Place;
 
 constexpr std::size_t list_rows = 12, curve_rows = 24, list_groups = 3; // that are shown
-constexpr int name_width = 27, value_width = 22;
+constexpr int name_width = 27, value_width = 22, all_digits = 7;
 
 std::string stage_row(const std::string& head, const std::string& text)
 {
@@ -38,12 +39,12 @@ std::string unit_text(const Result& result)
   return std::ranges::count(silent, result.unit) > 0 ? "" : result.unit;
 }
 
-/// A value without its unit; empty where it is not known.
-std::string value_text(const Json& value, const Result& result)
+/// A value without its unit; empty where it is not known. `digits`: of a number.
+std::string value_text(const Json& value, const Result& result, int digits)
 {
   std::string text;
   if (value.is_array())
-    for (const Json& one : value) text += (text.empty() ? "" : ", ") + value_text(one, result);
+    for (const Json& one : value) text += (text.empty() ? "" : ", ") + value_text(one, result, digits);
   else if (value.is_boolean())
     text = value.get<bool>() ? "yes" : "no";
   else if (value.is_string())
@@ -54,7 +55,7 @@ std::string value_text(const Json& value, const Result& result)
   {
     const double number = value.get<double>();
     const bool is_small = number != 0 && std::abs(number) < 1e-3 && result.unit == "-"; // a residual, mostly
-    text = format(result.place == Place::error_bar || is_small ? "%.1e" : "%.7g", number);
+    text = result.place == Place::error_bar || is_small ? format("%.1e", number) : format("%.*g", digits, number);
   }
   return text;
 }
@@ -92,7 +93,7 @@ std::string columns_text(const Result& list)
     const std::string unit = unit_text(first);
     std::vector<std::string> cells = {label(column.name), unit.empty() ? "" : "[" + unit + "]"};
     for (const std::size_t i : places)
-      cells.push_back(column.cells[i] ? value_text(column.cells[i]->value, first) : "");
+      cells.push_back(column.cells[i] ? value_text(column.cells[i]->value, first, all_digits) : "");
     if (std::all_of(cells.begin() + 2, cells.end(), [](const std::string& cell) { return cell.empty(); })) continue;
     std::size_t width = 0;
     for (const std::string& cell : cells) width = std::max(width, cell.size());
@@ -115,9 +116,10 @@ std::string columns_text(const Result& list)
 /// "    frequency   4840.5 Hz   meaning"; a text needs no meaning.
 std::string value_row(const std::string& name, const Result& result, const Result* error, std::string meaning)
 {
-  std::string value = value_text(result.value, result);
+  std::string value = value_text(result.value, result, all_digits);
   if (value.empty()) return "";
-  if (const std::string bar = error ? value_text(error->value, *error) : ""; !bar.empty()) value += " +- " + bar;
+  if (const std::string bar = error ? value_text(error->value, *error, all_digits) : ""; !bar.empty())
+    value += " +- " + bar;
   if (const std::string unit = unit_text(result); !unit.empty()) value += " " + unit;
   std::erase(meaning, '`');
   return format("    %-*s ", name_width, name.c_str()) +
@@ -161,46 +163,168 @@ std::string outcome_text(const Result& outcome, const Result* reason)
   return text + (reason ? ": " + reason->value.get<std::string>() : "");
 }
 
+/// A warning behind the word of its severity, which stands in capitals where a number may be off.
+std::string warning_row(const std::string& severity, const std::string& sentence)
+{
+  std::string head = severity;
+  if (severity != word(Severity::note))
+    std::ranges::transform(head, head.begin(), [](unsigned char c) { return std::toupper(c); });
+  return head + ": " + sentence + "\n";
+}
+
+/// The warnings of a stage in one severity, or in all where it is empty.
+std::vector<std::string> warnings_of(const Result& stage, const std::string& severity)
+{
+  std::vector<std::string> rows;
+  const Result *sentences = stage.part("warnings"), *severities = stage.part("severities");
+  for (std::size_t i = 0; sentences && i < sentences->value.size(); ++i)
+    if (const std::string own = severities->value[i].get<std::string>(); severity.empty() || own == severity)
+      rows.push_back(warning_row(own, sentences->value[i].get<std::string>()));
+  return rows;
+}
+
 /// A stage with what is shown of it, and its warnings; nothing of one that is off.
 std::string stage_text(const Result& stage)
 {
-  const Result *outcome = stage.part("outcome"), *warnings = stage.part("warnings");
+  const Result* outcome = stage.part("outcome");
   const bool is_off = outcome && outcome->value == word(OutcomeKind::off);
   if (is_off || (!outcome && !is_shown(stage))) return "";
   std::string text = stage_row(stage.name, outcome ? outcome_text(*outcome, stage.part("reason")) : "");
   text += group_text(stage, "");
-  if (warnings)
-    for (const Json& sentence : warnings->value) text += "    WARNING: " + sentence.get<std::string>() + "\n";
+  for (const std::string& row : warnings_of(stage, "")) text += "    " + row;
   return text;
 }
 
 std::string timings_text(const Report& report)
 {
-  double total = 0;
   std::string text = stage_row("time", "");
   for (const auto& [stage, seconds, processor_seconds] : report.timings)
-  {
     if (seconds >= 0.01) text += format("    %-*s %.2f s\n", name_width, word(stage), seconds);
-    total += seconds;
+  return text;
+}
+
+/// The brief values of a group, "a text, name 1 unit"; of its groups behind their names.
+std::string brief_values(const Result& group, const std::string& place)
+{
+  std::string text;
+  const auto add = [&](const std::string& one) { text += (text.empty() || one.empty() ? "" : ", ") + one; };
+  for (const Result& part : group.parts)
+  {
+    const std::string name = place + label(part.name), unit = unit_text(part);
+    if (part.kind == Kind::group) add(brief_values(part, name + " "));
+    if (!part.is_brief) continue;
+    const bool is_word = part.unit == "text" || part.unit == "word";
+    if (const std::string value = value_text(part.value, part, 5); !value.empty())
+      add((is_word ? "" : name + " ") + value + (unit.empty() ? "" : " " + unit));
   }
-  return text + format("    %-*s %.2f s\n", name_width, "in all", total);
+  return text;
+}
+
+/// The brief entries of a list, as many to a row as fit.
+std::string brief_list(const Result& list)
+{
+  constexpr std::size_t width = 100, most = 3; // letters of a row; rows
+  std::vector<std::string> rows;
+  std::size_t entries = 0, shown = 0;
+  for (const Result& one : list.parts)
+  {
+    const std::string values = brief_values(one, "");
+    if (values.empty()) continue;
+    ++entries;
+    const bool fits = !rows.empty() && rows.back().size() + values.size() < width;
+    if (!fits && rows.size() == most) continue;
+    if (fits)
+      rows.back() += "; " + values;
+    else
+      rows.push_back(values);
+    ++shown;
+  }
+  if (shown < entries) rows.back() += format("; and %zu more", entries - shown);
+  std::string text;
+  for (const std::string& row : rows) text += stage_row("  " + (text.empty() ? label(list.name) : ""), row);
+  return text;
+}
+
+/// The brief lists of a group and of the groups and lists in it.
+std::string brief_lists(const Result& group)
+{
+  std::string text;
+  for (const Result& part : group.parts)
+    text += part.kind == Kind::list ? brief_list(part) : part.kind == Kind::group ? brief_lists(part) : "";
+  return text;
+}
+
+/// A row for a stage that has run, and rows for its lists.
+std::string brief_stage(const Result& stage)
+{
+  const Result* outcome = stage.part("outcome");
+  if (outcome && (outcome->value == word(OutcomeKind::off) || outcome->value == word(OutcomeKind::skipped))) return "";
+  std::string row = outcome ? outcome_text(*outcome, stage.part("reason")) : "";
+  const std::string values = brief_values(stage, ""), lists = brief_lists(stage);
+  row += (row.empty() || values.empty() ? "" : ", ") + values;
+  return (row.empty() ? "" : stage_row(stage.name, row)) + lists;
+}
+
+/// Counts the checks of a tree, and names those that did not pass.
+void count_checks(const Result& group, const std::string& place, int& passed, std::vector<std::string>& failed)
+{
+  for (const Result& part : group.parts)
+  {
+    const std::string name = place + label(part.name);
+    count_checks(part, part.kind == Kind::group ? name + " " : place, passed, failed);
+    if (!part.passed) continue;
+    passed += *part.passed;
+    if (!*part.passed) failed.push_back(name + " " + value_text(part.value, part, 5));
+  }
+}
+
+std::string checks_text(const Result& results)
+{
+  int passed = 0;
+  std::vector<std::string> failed;
+  count_checks(results, "", passed, failed);
+  std::string text = std::to_string(passed) + (failed.empty() ? " passed" : " passed, FAILED: ");
+  for (const std::string& name : failed) text += (&name == &failed.front() ? "" : ", ") + name;
+  return stage_row("checks", text);
+}
+
+/// The severest first, and no more than a reader takes in.
+std::string warnings_text(const Result& results)
+{
+  constexpr std::size_t most = 4;
+  std::vector<std::string> rows;
+  for (const Severity severity : {Severity::severe, Severity::warning, Severity::note})
+    for (const Result& stage : results.parts)
+      std::ranges::copy(warnings_of(stage, word(severity)), std::back_inserter(rows));
+  std::string text;
+  for (std::size_t i = 0; i < std::min(most, rows.size()); ++i) text += "  " + rows[i];
+  return text + (rows.size() > most ? format("  %zu further remarks with --verbose\n", rows.size() - most) : "");
 }
 
 } // namespace
 
-std::string table(const Report& report, const Scene& scene)
+std::string table(const Report& report, const Scene& scene, TableLength length)
 {
-  std::string text = "\n" + (scene.title.empty() ? scene.file.filename().string() : scene.title) + "\n";
+  const std::string title = "\n" + (scene.title.empty() ? scene.file.filename().string() : scene.title) + "\n";
   const Result results = results_of(report, scene);
+  std::string stages, text = title;
   for (const Result& part : results.parts)
-    if (part.kind == Kind::group) text += stage_text(part);
-  return text + timings_text(report) + stage_row("heard", heard(report, scene));
+    if (part.kind == Kind::group)
+    {
+      if (length == TableLength::full) text += stage_text(part);
+      stages += brief_stage(part);
+    }
+  if (length == TableLength::full) text += timings_text(report) + title;
+  double seconds = 0;
+  for (const Timing& timing : report.timings) seconds += timing.seconds;
+  return text + stage_row("heard", heard(report, scene)) + stages + checks_text(results) + warnings_text(results) +
+         stage_row("time", format("%.2f s", seconds)) + stage_row("next", next_command(report, scene));
 }
 
-void print_table(const Report& report, const Scene& scene, MPI_Comm comm)
+void print_table(const Report& report, const Scene& scene, TableLength length, MPI_Comm comm)
 {
   if (rank_of(comm) != 0) return;
-  std::fputs(table(report, scene).c_str(), stdout);
+  std::fputs(table(report, scene, length).c_str(), stdout);
   std::fflush(stdout);
 }
 

@@ -47,6 +47,13 @@ std::span<double> numbers_of(const Target& target, WordsLeft& words)
   return (**vectors)[*place];
 }
 
+std::vector<std::string> keys_in(const std::vector<SceneNumber>& numbers)
+{
+  std::vector<std::string> keys;
+  for (const SceneNumber& number : numbers) keys.push_back(number.key);
+  return keys;
+}
+
 FoundValue find_among(const SceneKeys& keys, const std::string& label, WordsLeft words);
 
 /// The value in a table, of which the first word selects an entry if it is a list.
@@ -121,8 +128,30 @@ std::vector<EntryKey> entries_of(Scene& scene, const std::string& table)
   return entries;
 }
 
+std::vector<SceneNumber> driven_by(const Scene& scene, std::span<const SceneNumber> numbers)
+{
+  std::vector<SceneNumber> driven;
+  for (const auto& [key, value] : numbers)
+  {
+    if (!key.starts_with(named_numbers))
+      driven.push_back({key, value});
+    else
+      for (const NumberUse& use : scene.number_uses)
+        if (named_numbers + use.name == key) driven.push_back({use.key, use.sign * value});
+  }
+  return driven;
+}
+
 NumberDescription description_of(const Scene& scene, const std::string& key)
 {
+  const std::array asked = {SceneNumber{key, 0}};
+  if (const std::vector<SceneNumber> driven = driven_by(scene, asked);
+      key.starts_with(named_numbers) && !driven.empty())
+  {
+    NumberDescription description = description_of(scene, driven.front().key);
+    description.name = joined(keys_in(driven));
+    return description;
+  }
   Scene copy = scene; // keys bind members that can be written
   const FoundValue found = find_value(copy, key);
   const bool spins = key.starts_with("part.") &&
@@ -131,14 +160,22 @@ NumberDescription description_of(const Scene& scene, const std::string& key)
   return {found.unit, found.title, stiffens ? Effect::stiffness_and_mass : found.effect};
 }
 
+Places places_of(const Scene& scene)
+{
+  Places places{scene.file.string(), {}};
+  for (const Part& part : scene.parts)
+    if (!part.material.orthotropy) places.given[&part.material.poisson] = places.file;
+  for (const Force& force : scene.forces) places.given[&force.vector] = places.file;
+  return places;
+}
+
 Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers)
 {
   Scene changed = scene;
-  Places places{scene.file.string(), {}};
-  for (const Part& part : changed.parts)
-    if (!part.material.orthotropy) places.given[&part.material.poisson] = places.file;
-  for (const Force& force : changed.forces) places.given[&force.vector] = places.file;
+  Places places = places_of(changed);
   for (const auto& [key, value] : numbers)
+    if (key.starts_with(named_numbers)) changed.numbers[key.substr(std::string(named_numbers).size())] = value;
+  for (const auto& [key, value] : driven_by(scene, numbers))
   {
     const std::string given = "--set " + key + "=" + text_of_number(value);
     const FoundValue number = find_value(changed, key);
@@ -150,6 +187,7 @@ Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers)
     if (problem.empty() && is_listed) problem = problem_of_list(number.key.rule, number.entries);
     if (!problem.empty()) refuse_value(number.key, place, text_of_number(value), problem);
     places.given[number.number] = given;
+    if (key.starts_with("rotor.")) take_drives(changed);
   }
   check_scene(changed, places);
   return changed;

@@ -3,6 +3,7 @@
 #include "scene_checker.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <set>
 
@@ -30,6 +31,7 @@ public:
       for (const Support& support : scene_.supports) need_known(support.on, points_, &support.on, "[[support]] on");
       for (const Force& force : scene_.forces) need_known(force.on, nodes_, &force.on, "[[force]] on");
     }
+    for (const Rotor& rotor : scene_.rotors) check_rotor(rotor);
     for (const Contact& contact : scene_.contacts) check_contact(contact);
     check_contacts_differ();
     check_steps();
@@ -89,6 +91,7 @@ private:
     refuse(s.superelements, "superelement", why);
     refuse(s.pressures, "pressure", why);
     refuse(s.contacts, "contact", why);
+    refuse(s.rotors, "rotor", why);
     refuse(s.ties, "tie", why);
     for (const Support& support : s.supports)
     {
@@ -127,6 +130,10 @@ private:
   void check_names() const
   {
     std::set<std::string> parts, nodes = {ground}, superelements, probes, beams, bolts; // springs refer to the ground
+    for (const auto& [name, value] : scene_.numbers)
+      if (!std::isalpha(static_cast<unsigned char>(name[0])) ||
+          !std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c) || c == '_'; }))
+        fail(&scene_.numbers, "[numbers] '" + name + "': a name begins with a letter, and holds letters, digits and _");
     need_different(scene_.parts, "part", parts);
     need_different(scene_.points, "point", nodes);
     need_different(scene_.rigid_bodies, "rigid_body", nodes);
@@ -210,6 +217,20 @@ private:
     if (contact.friction) check_law(*contact.friction, &contact.friction, "[[contact]]");
     if (contact.slip_compliance > 0) check_elastic_slip(contact);
     check_frame(contact);
+  }
+
+  void check_rotor(const Rotor& rotor) const
+  {
+    const std::string label = "[[rotor]] " + rotor.part + " ";
+    std::vector<std::string> known = names_of(scene_.parts);
+    known.insert(known.end(), points_.begin(), points_.end());
+    need_known(rotor.part, known, &rotor.part, "[[rotor]] part");
+    if (std::ranges::count(scene_.rotors, rotor.part, &Rotor::part) > 1)
+      fail(&rotor.part, label + "is there twice: one part moves in one way; keep one of the tables");
+    const bool turns = rotor.rotation.axis != Vec3{}, moves = rotor.velocity != Vec3{};
+    if (turns == moves || (rotor.rotation.rate != 0 && !turns))
+      fail(&rotor,
+           label + (turns ? "has a rate and a velocity: keep one of them" : "needs axis and rate, or a velocity"));
   }
 
   void check_elastic_slip(const Contact& contact) const

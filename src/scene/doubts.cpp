@@ -1,4 +1,4 @@
-/// A model is 1 cm to 1 km long: what squeals goes from a bicycle's brake pad to a rail.
+/// A model is 1 cm to 10 m long and weighs at most 100 t: what squeals goes from a bicycle's brake pad to a bogie.
 /// Bounds of solids (Ashby, Materials Selection in Mechanical Design, charts of moduli and densities). Densities go
 /// from 20 kg/m3 (foams) to 22 590 (osmium), Young's moduli from 1e4 Pa (gels) to 1.3e12 (diamond). Speeds of
 /// sound sqrt(E/rho) go from 10 m/s (soft rubber has 30) to 20 000 (diamond has 18 000). A grain of dust of 10 um
@@ -16,7 +16,8 @@ namespace squeal
 namespace
 {
 
-constexpr double softest = 1e4; // Young's modulus of gels [Pa]
+constexpr double softest = 1e4;                // Young's modulus of gels [Pa]
+constexpr double longest = 10, heaviest = 1e5; // [m], [kg]
 
 bool is_outside(double value, double least, double greatest)
 {
@@ -98,9 +99,20 @@ void doubt_damping(const RayleighDamping& damping, std::vector<std::string>& dou
   }
 }
 
+/// Whether contacts may feed a structure of parts in which nothing takes energy.
+bool has_no_damping(const Scene& scene)
+{
+  const auto damps = [](const RayleighDamping& damping) { return damping.alpha > 0 || damping.beta > 0; };
+  return !scene.parts.empty() && !scene.contacts.empty() && scene.superelements.empty() && !damps(scene.damping) &&
+         scene.damping.measured.empty() && scene.damping.loss_frequency == 0 &&
+         std::ranges::none_of(scene.parts, [&](const Part& part) { return part.damping && damps(*part.damping); }) &&
+         std::ranges::none_of(scene.springs, [](const Spring& spring) { return spring.damping > 0; }) &&
+         std::ranges::all_of(scene.connectors, [](const Connector& joint) { return joint.damping.empty(); });
+}
+
 } // namespace
 
-std::vector<std::string> doubts_about(const Scene& scene, double length)
+std::vector<std::string> doubts_about(const Scene& scene, double length, double mass)
 {
   std::vector<std::string> doubts;
   for (const Part& part : scene.parts)
@@ -113,8 +125,16 @@ std::vector<std::string> doubts_about(const Scene& scene, double length)
   doubt_masses(scene.points, doubts);
   doubt_masses(scene.rigid_bodies, doubts);
   doubt_loads(scene, doubts);
-  if (scene.mesh && length > 0 && is_outside(length, 0.01, 1000))
+  if (scene.mesh && (length > longest || mass > heaviest))
+    doubts.push_back(format("the model is %.3g m long and weighs %.3g kg: is its mesh in mm? then mesh.scale = 0.001",
+                            length, mass));
+  else if (scene.mesh && length > 0 && length < 0.01)
     doubts.push_back(format("the model is %.3g m long: is mesh.scale right?", length));
+  for (const auto& [name, value] : scene.numbers)
+    if (std::ranges::find(scene.number_uses, name, &NumberUse::name) == scene.number_uses.end())
+      doubts.push_back("the number '" + name + "' of [numbers] stands nowhere in the scene");
+  if (has_no_damping(scene))
+    doubts.push_back("nothing damps the structure: modes that friction couples grow at any friction; give [damping]");
   if (length > 0) doubt_contacts(scene, length, doubts);
   doubt_cycle(scene, doubts);
   doubt_damping(scene.damping, doubts);

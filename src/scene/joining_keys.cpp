@@ -1,4 +1,4 @@
-/// The keys of what joins bodies: couplings, connectors, beams, bolts, added masses.
+/// The keys of what joins bodies and of what moves them: couplings, connectors, beams, bolts, added masses, rotors.
 #include "scene_keys.hpp"
 
 namespace squeal
@@ -96,6 +96,17 @@ SceneKeys keys_of(Bolt& b)
       {"beam", &b.beam, "text", "a [[beam]] as the shank, instead of a section"},
       {"tension", &b.tension, "N", "force that it is tightened to; it keeps its length from then on", required,
        positive, load},
+  };
+}
+
+SceneKeys keys_of(Rotor& r)
+{
+  return {
+      {"part", &r.part, "text", "part that moves past others, or a point", required},
+      {"axis", &r.rotation.axis, "-", "axis of rotation: x, y, z or a vector; with rate", direction, drive},
+      {"centre", &r.rotation.centre, "m", "a point of the axis; the origin when absent", drive},
+      {"rate", &r.rotation.rate, "rad/s", "angular velocity", drive},
+      {"velocity", &r.velocity, "m/s", "of its surface, instead of axis and rate: a belt", velocity, drive},
   };
 }
 

@@ -14,12 +14,19 @@ namespace
 {
 
 /// Tables whose numbers are of the structure, its contact and its loads.
-const std::vector<std::string> physical = {"part",    "point",   "rigid_body", "coupling", "spring",   "connector",
-                                           "beam",    "mass",    "support",    "force",    "pressure", "bolt",
-                                           "gravity", "contact", "friction",   "damping"};
+const std::vector<std::string> physical = {"part",    "point", "rigid_body", "coupling", "spring",   "connector",
+                                           "beam",    "mass",  "support",    "force",    "pressure", "bolt",
+                                           "gravity", "rotor", "contact",    "friction", "damping"};
 
 /// Tables on which the mesh or the given matrices depend.
 constexpr std::array of_the_mesh = {"mesh", "matrices"};
+
+std::vector<std::string> named_keys(const Scene& scene)
+{
+  std::vector<std::string> keys;
+  for (const auto& [name, value] : scene.numbers) keys.push_back(named_numbers + name);
+  return keys;
+}
 
 /// Does a check; the text of an Error of it then begins with `prefix`.
 template <class Check> void prefixed(const std::string& prefix, Check check)
@@ -45,6 +52,18 @@ std::vector<SceneNumber> numbers_of(std::span<const std::string> keys, std::span
 
 double number_at(const Scene& scene, const std::string& key, const std::string& table)
 {
+  if (key.starts_with(named_numbers))
+  {
+    const auto own = scene.numbers.find(key.substr(std::string(named_numbers).size()));
+    if (own == scene.numbers.end())
+      throw Error(table + " key = \"" + key + "\" is none of [numbers]" + hint_or_list(key, named_keys(scene)));
+    const std::array named = {SceneNumber{key, 0}};
+    const std::vector<SceneNumber> driven = driven_by(scene, named);
+    if (driven.empty())
+      throw Error(table + " key = \"" + key + "\" stands nowhere in the scene: give its name for a value");
+    for (const SceneNumber& number : driven) (void)number_at(scene, number.key, table + " by " + key);
+    return own->second;
+  }
   const auto refusal = [&](const std::string& why) { return Error(table + " key = \"" + key + "\" " + why); };
   const std::string first = key.substr(0, key.find('.'));
   if (std::ranges::find(of_the_mesh, first) != of_the_mesh.end())
@@ -79,6 +98,9 @@ public:
 
   void check_all()
   {
+    if (!sweep_.table.empty()) read_design();
+    if (sweep_.key.empty()) fail(&sweep_, "needs the key 'key', the number that changes, or 'table', a file of points");
+    if (!sweep_.table.empty()) return;
     const std::size_t numbers = sweep_.key.size();
     if (numbers > 2) fail(&sweep_.key, "names " + std::to_string(numbers) + " numbers: give one or two");
     if (numbers == 2 && sweep_.key[0] == sweep_.key[1])
@@ -107,6 +129,19 @@ private:
            list.empty() ? std::string(name) + " is missing: give one a key"
                         : std::string(name) + " holds " + std::to_string(list.size()) + " numbers for " +
                               std::to_string(sweep_.key.size()) + " keys: give one a key");
+  }
+
+  /// The points of the file, whose numbers are of the scene; what makes no scene fails as a point.
+  void read_design()
+  {
+    if (!sweep_.from.empty() || !sweep_.to.empty() || !sweep_.values.empty() || sweep_.samples > 0)
+      fail(&sweep_.table, "table holds all values: take from, to, values and samples out");
+    const DesignTable table = read_design_table(sweep_.table);
+    if (!sweep_.key.empty() && sweep_.key != table.keys) fail(&sweep_.key, "table holds the keys: take key out");
+    sweep_.key = table.keys;
+    sweep_.design = table.points;
+    for (const std::string& key : sweep_.key)
+      prefixed(sweep_.table.string() + ": ", [&] { (void)number_at(scene_, key, "[sweep] table:"); });
   }
 
   /// A list of values, a grid, or samples of a range.
@@ -187,6 +222,7 @@ const std::vector<TableNumbers> derived_by = {
     {"connector", {"loss_factor"}},
     {"beam", {"young", "density", "loss_factor"}},
     {"mass", {"mass"}},
+    {"rotor", {"rate"}},
     {"contact", {"rotation.rate"}}};
 
 /// Numbers that the mass and the stiffness of a component are linear in.
@@ -202,6 +238,14 @@ const std::vector<TableNumbers> linear_in = {
     {"beam", {"density", "young"}},
     {"mass", {"mass"}}};
 
+/// Whether a contact has this number from a rotor.
+bool is_of_a_rotor(const Scene& scene, const std::string& key)
+{
+  for (std::size_t i = 0; i < scene.contacts.size(); ++i)
+    if (scene.contacts[i].driven_by >= 0 && key.starts_with(format("contact.%zu.rotation", i))) return true;
+  return false;
+}
+
 /// An entry's numbers that are not zero; of a list all of them.
 std::vector<SceneNumber> numbers_in(Scene& scene, const EntryKey& entry, const std::vector<const char*>& keys)
 {
@@ -209,7 +253,7 @@ std::vector<SceneNumber> numbers_in(Scene& scene, const EntryKey& entry, const s
   const auto add = [&](const std::string& key)
   {
     const FoundValue found = find_value(scene, key);
-    if (found.number && *found.number != 0) numbers.push_back({key, *found.number});
+    if (found.number && *found.number != 0 && !is_of_a_rotor(scene, key)) numbers.push_back({key, *found.number});
     return found.number != nullptr;
   };
   for (const char* own : keys)
@@ -272,7 +316,8 @@ std::vector<std::string> contact_names(const Scene& scene)
 std::vector<SceneNumber> from_zero(const Scene& scene, const SceneNumber& number)
 {
   std::vector<SceneNumber> numbers{number};
-  if (number.key.ends_with(".loss_factor") && scene.damping.loss_frequency == 0)
+  const auto is_loss = [](const SceneNumber& driven) { return driven.key.ends_with(".loss_factor"); };
+  if (std::ranges::any_of(driven_by(scene, numbers), is_loss) && scene.damping.loss_frequency == 0)
     numbers.push_back({"damping.loss_frequency", scene.modes.band});
   return numbers;
 }

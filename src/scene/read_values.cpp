@@ -41,14 +41,6 @@ Bounds bounds_of(Rule rule)
   }
 }
 
-/// The key of a value and what messages and paths need besides.
-struct ValuePlace
-{
-  const SceneKey& key;
-  const std::string& label;            // of the key's table
-  const std::filesystem::path& folder; // that paths are relative to
-};
-
 /// Reads one value into any of the members that a key may have.
 class ValueReader
 {
@@ -199,7 +191,8 @@ private:
   /// Throws Error for a value of the key that is not as expected.
   [[noreturn]] void fail(const toml::node& node, const std::string& expected) const
   {
-    refuse_value(value_.key, place_of(node) + ": " + value_.label, text_of(node), expected);
+    refuse_value(value_.key, (value_.place.empty() ? place_of(node) : value_.place) + ": " + value_.label,
+                 text_of(node), expected);
   }
 
   /// Throws Error for what is not finite, and where the third power would not be.
@@ -315,8 +308,8 @@ private:
   const ValuePlace& value_;
 };
 
-/// Sets the member of a key that is no table. Throws Error for a value that is not of the key's kind, or outside its
-/// rule.
+} // namespace
+
 void read_value(const ValuePlace& value, const toml::node& node)
 {
   const ValueReader reader(value);
@@ -331,79 +324,6 @@ void read_value(const ValuePlace& value, const toml::node& node)
       },
       value.key.target);
 }
-
-/// Reads the tables of one scene and records the places of its values.
-class Reader
-{
-public:
-  Reader(Places& places, std::filesystem::path folder) : places_(places), folder_(std::move(folder)) {}
-
-  /// `place`, `label`: of the table.
-  void read_keys(const toml::table& table, const SceneKeys& keys, const std::string& place, const std::string& label)
-  {
-    std::vector<std::string> known;
-    for (const SceneKey& key : keys) known.push_back(key.name);
-    for (const auto& [key, value] : table)
-      if (std::ranges::find(known, key.str()) == known.end())
-        throw Error(place_of(value) + ": " + label + "unknown key '" + std::string(key.str()) + "'" +
-                    hint_or_list(std::string(key.str()), known));
-    for (const SceneKey& key : keys)
-    {
-      if (const toml::node* value = table.get(key.name))
-        read_key(key, *value, label);
-      else if (key.need == Need::required)
-        throw Error(place + ": " + label + "needs the key '" + key.name + "' [" + key.unit + "]: " + key.meaning);
-    }
-  }
-
-private:
-  void read_key(const SceneKey& key, const toml::node& node, const std::string& label)
-  {
-    if (const auto* tables = std::get_if<TableTarget>(&key.target)) return read_tables(key, *tables, node, label);
-    read_value({key, label, folder_}, node);
-    if (const void* const member = member_of(key.target)) places_.given[member] = place_of(node);
-  }
-
-  void read_tables(const SceneKey& key, const TableTarget& tables, const toml::node& node, const std::string& label)
-  {
-    const bool is_list = tables.form == TableForm::list;
-    if (is_list && !node.is_array())
-      throw Error(place_of(node) + ": '" + key.name + "' is a list; write " + heading_of(key));
-    const std::size_t size = is_list ? node.as_array()->size() : 1;
-    tables.resize(size); // at once, so that the addresses in places_ stay valid
-    for (std::size_t i = 0; i < size; ++i)
-    {
-      const toml::node& entry = is_list ? *node.as_array()->get(i) : node;
-      const toml::table* table = entry.as_table();
-      const std::string name = table && is_list ? (*table)["name"].value_or<std::string>("") : "";
-      const std::string entry_label = label_of(key, name, label), place = place_of(entry);
-      if (!table) throw Error(place + ": " + entry_label + "is a table, not " + kind_of(entry));
-      const auto [member, own_name, title, keys] = tables.entry(i);
-      places_.given[member] = place;
-      read_keys(*table, keys, place, entry_label);
-    }
-  }
-
-  /// The member that checks of a scene name; null: they name none.
-  static const void* member_of(const Target& target)
-  {
-    return std::visit(
-        [](const auto& of) -> const void*
-        {
-          using Kind = std::remove_cvref_t<decltype(of)>;
-          if constexpr (std::is_pointer_v<Kind>) return of;
-          if constexpr (std::is_same_v<Kind, Choice>) return of.member;
-          if constexpr (std::is_same_v<Kind, StartTarget>) return of.kind.member;
-          return nullptr;
-        },
-        target);
-  }
-
-  Places& places_;
-  std::filesystem::path folder_;
-};
-
-} // namespace
 
 std::string problem_of_number(Rule rule, double value)
 {
@@ -429,11 +349,6 @@ void refuse_value(const SceneKey& key, const std::string& place, const std::stri
 {
   throw Error(place + key.name + " = " + text + ": expected " + expected +
               (has_unit(key.unit) ? " [" + key.unit + "]" : ""));
-}
-
-void read_tables(const toml::table& root, Scene& scene, Places& places)
-{
-  Reader(places, scene.file.parent_path()).read_keys(root, keys_of(scene), scene.file.string(), "");
 }
 
 } // namespace squeal

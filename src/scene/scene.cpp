@@ -157,6 +157,38 @@ bool are_given(const Ramps& ramps)
   return !ramps.load.at.empty() || !ramps.speed.at.empty() || !ramps.friction.at.empty();
 }
 
+void take_drives(Scene& scene)
+{
+  for (Contact& contact : scene.contacts)
+  {
+    if (contact.driven_by < 0) continue;
+    const Rotor& rotor = scene.rotors[static_cast<std::size_t>(contact.driven_by)];
+    contact.velocity = rotor.velocity;
+    if (rotor.rotation.axis != Vec3{}) contact.rotation = rotor.rotation;
+  }
+}
+
+void drive_contacts(Scene& scene, std::span<const int> rotors)
+{
+  for (std::size_t i = 0; i < scene.contacts.size(); ++i)
+  {
+    Contact& contact = scene.contacts[i];
+    if (rotors[i] < 0 || contact.driven_by == rotors[i]) continue;
+    if (!is_undriven(contact))
+      throw Error("[[contact]] of " + contact.stator + " on " + contact.rotor +
+                  " has a drive of its own, and [[rotor]] " + scene.rotors[static_cast<std::size_t>(rotors[i])].part +
+                  " drives it too: take rotation or velocity out of the contact");
+    contact.driven_by = rotors[i];
+  }
+  for (std::size_t r = 0; r < scene.rotors.size(); ++r)
+    if (std::ranges::find(rotors, static_cast<int>(r)) == rotors.end())
+      throw Error("[[rotor]] " + scene.rotors[r].part +
+                  " drives nothing: no [[contact]] has one of its surfaces for rotor");
+  take_drives(scene);
+  check_scene(scene, places_of(scene));
+  resolve_friction(scene);
+}
+
 void resolve_friction(Scene& scene)
 {
   const FrictionLaw& law = scene.friction;
@@ -180,7 +212,7 @@ Scene read_scene(const std::filesystem::path& file, const std::vector<std::strin
   Places places{file.string(), {}};
   read_tables(root, scene, places);
   check_scene(scene, places);
-  resolve_friction(scene);
+  if (scene.rotors.empty()) resolve_friction(scene); // else the mesh tells which contacts they drive
   fit_damping(scene, places);
   resolve_branch(scene, places);
   resolve_sweep(scene, places);

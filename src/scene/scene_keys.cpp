@@ -19,6 +19,8 @@ template <class Entry> std::string title_of(const Entry& entry)
 {
   if constexpr (requires { entry.name; })
     return entry.name;
+  else if constexpr (requires { entry.part; })
+    return entry.part;
   else if constexpr (requires { entry.stator; })
     return entry.stator + " on " + entry.rotor;
   else if constexpr (
@@ -238,7 +240,8 @@ SceneKeys keys_of(Contact& c)
       {"slave", choice_of(c.slave), "word", "side whose nodes have the pairs: the finer or softer one"},
       {"tangents", &c.tangents, "-", "one direction: plane friction along it; or two; when absent, two are chosen",
        direction, drive},
-      {"rotation", braces(c.rotation), "table", "rotation of the rotor: {axis, centre, rate}", drive},
+      {"rotation", braces(c.rotation), "table",
+       "rotation of the rotor: {axis, centre, rate}; a [[rotor]] of its part says it once", drive},
       {"velocity", &c.velocity, "m/s",
        "velocity of the rotor's surface, instead of a rotation; without either the contact sticks or slips by itself",
        velocity, drive},
@@ -354,6 +357,8 @@ SceneKeys keys_of(Scene& scene)
        "in growth rates of [robustness] over what they scatter by",
        positive},
       {"gravity", &scene.gravity, "m/s2", "acceleration of gravity; no load factor scales it", load},
+      {"numbers", &scene.numbers, "table",
+       "named numbers: a name in quotes, or \"-name\", then stands for the number wherever a key takes one"},
       section("mesh", scene.mesh, "a mesh and how to read it"),
       section("matrices", scene.matrices, "matrices of another code instead of a mesh"),
       section("part", scene.parts, "a named volume of the mesh, or a named surface with a thickness (shell)"),
@@ -369,6 +374,7 @@ SceneKeys keys_of(Scene& scene)
       section("force", scene.forces, "force on a point, a rigid body or a named group"),
       section("pressure", scene.pressures, "pressure on a named surface"),
       section("bolt", scene.bolts, "a bolt that is tightened and then keeps its length"),
+      section("rotor", scene.rotors, "a part that turns or moves, and drives all contacts that it is the rotor of"),
       section("contact", scene.contacts, "two named surfaces or two points in contact with friction"),
       section("step", scene.steps, "a step on the way to the loads; undriven contacts depend on their order"),
       section("initial", scene.initial, "a displacement or velocity that the transient starts with"),

@@ -128,13 +128,14 @@ bool has_unit(const std::string& unit);
 /// Returns the keys of a scene file, its tables in the order in which they are written.
 SceneKeys keys_of(Scene& scene);
 
-/// Keys of what joins bodies.
+/// Keys of what joins bodies and moves them.
 SceneKeys keys_of(Axis& axis);
 SceneKeys keys_of(Coupling& coupling);
 SceneKeys keys_of(Connector& connector);
 SceneKeys keys_of(Beam& beam);
 SceneKeys keys_of(AddedMass& mass);
 SceneKeys keys_of(Bolt& bolt);
+SceneKeys keys_of(Rotor& rotor);
 
 /// Keys of the tables of stages and studies.
 SceneKeys keys_of(ModesSettings& modes);
@@ -159,6 +160,9 @@ struct Places
   std::string at(const void* member) const;
 };
 
+/// Places of a scene that was checked: what it needs is given, in its file.
+Places places_of(const Scene& scene);
+
 /// The names of a list's entries.
 template <class Entry> std::vector<std::string> names_of(const std::vector<Entry>& list)
 {
@@ -172,6 +176,9 @@ void check_scene(const Scene& scene, const Places& places);
 
 /// Throws Error on contradictions in what joins bodies, in the frames of supports and in loss factors.
 void check_joining(const Scene& scene, const Places& places);
+
+/// Gives contacts that a rotor drives its drive.
+void take_drives(Scene& scene);
 
 /// Gives undriven contacts without a friction of their own that of the scene, which sweeps then change elsewhere alone.
 void resolve_friction(Scene& scene);

@@ -106,13 +106,16 @@ SceneKeys keys_of(BranchSettings& b)
 SceneKeys keys_of(SweepSettings& s)
 {
   return {
-      {"key", &s.key, "texts", "number of the structure, its contact or its loads, as --set names it, or a list of two",
-       required},
+      {"key", &s.key, "texts",
+       "number of the structure, its contact or its loads, as --set names it, or a list of two"},
       {"from", &s.from, "-",
        "its first value, in its own unit; a list of two for two numbers, here and in the next lines"},
       {"to", &s.to, "-", "its last value"},
       {"points", &s.points, "-", "number of values from the first to the last", positive},
       {"values", &s.values, "-", "list of values of a single number, instead of the grid"},
+      {"table", &s.table, "path",
+       "CSV file of points instead of all these: a head of keys, such as numbers.clamp, and a line of values a point",
+       file},
       {"samples", &s.samples, "-",
        "number of random points of the ranges, evenly distributed, instead of the grid; 0: none", not_negative},
       {"seed", &s.seed, "-", "seed of the random points", not_negative},

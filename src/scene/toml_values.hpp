@@ -44,6 +44,19 @@ std::string problem_of_list(Rule rule, std::span<double> entries);
 [[noreturn]] void refuse_value(const SceneKey& key, const std::string& place, const std::string& text,
                                const std::string& expected);
 
+/// The key of a value and what messages and paths need besides.
+struct ValuePlace
+{
+  const SceneKey& key;
+  const std::string& label;            // of the key's table
+  const std::filesystem::path& folder; // that paths are relative to
+  std::string place = {};              // empty: that of the node
+};
+
+/// Sets the member of a key that is no table. Throws Error for a value that is not of the key's kind, or outside its
+/// rule.
+void read_value(const ValuePlace& value, const toml::node& node);
+
 /// Fills the scene from its tables and records where each value was given.
 void read_tables(const toml::table& root, Scene& scene, Places& places);
 

@@ -14,117 +14,117 @@ namespace squeal
 namespace
 {
 
-// print returns the TOML text of a value.
-
-std::string print(const std::string& text)
+/// The TOML text of values. Where a named number stands, its name does.
+class Printer
 {
-  return toml_string(text);
-}
+public:
+  explicit Printer(Scene& scene)
+  {
+    for (const NumberUse& use : scene.number_uses)
+      if (const double* number = find_value(scene, use.key).number)
+        names_[number] = toml_string((use.sign < 0 ? "-" : "") + use.name);
+  }
 
-/// The text is the shortest that reads back as the same number.
-std::string print(double value)
-{
-  std::string text = text_of_number(value);
-  if (text.find_first_of(".e") == std::string::npos && text.size() > 15) text += ".0"; // no TOML integer
-  return text;
-}
+  /// The TOML text of a key's value; empty if it is left out, since its default means the same.
+  std::string value_text(const SceneKey& key) const
+  {
+    if (is_absent(key)) return "";
+    return std::visit(
+        [this](const auto& target)
+        {
+          if constexpr (std::is_pointer_v<std::remove_cvref_t<decltype(target)>>)
+            return print(*target);
+          else
+            return print(target);
+        },
+        key.target);
+  }
 
-template <std::integral Whole> std::string print(Whole value)
-{
-  return std::is_same_v<Whole, bool> ? (value ? "true" : "false") : std::to_string(value);
-}
+private:
+  std::string print(const std::string& text) const { return toml_string(text); }
 
-std::string print(const std::filesystem::path& path)
-{
-  return print(path.string());
-}
+  /// The text is the shortest that reads back as the same number, or the name of the number that stands there.
+  std::string print(const double& value) const
+  {
+    if (const auto name = names_.find(&value); name != names_.end()) return name->second;
+    std::string text = text_of_number(value);
+    if (text.find_first_of(".e") == std::string::npos && text.size() > 15) text += ".0"; // no TOML integer
+    return text;
+  }
 
-std::string print(const Motions& motions)
-{
-  std::string text;
-  for (std::size_t i = 0; i < 6; ++i)
-    if (motions[i]) text += std::string(text.empty() ? "" : " ") + motion_words[i];
-  return print(text.empty() ? no_motions : text);
-}
+  template <std::integral Whole> std::string print(Whole value) const
+  {
+    return std::is_same_v<Whole, bool> ? (value ? "true" : "false") : std::to_string(value);
+  }
 
-std::string print(const MeasuredRatio& measured)
-{
-  const std::string frequency = print(measured.frequency_hz), ratio = print(measured.ratio);
-  return "[" + frequency + ", " + ratio + "]";
-}
+  std::string print(const std::filesystem::path& path) const { return print(path.string()); }
 
-/// A vector, or a list of any values.
-template <std::ranges::range List> std::string print(const List& list)
-{
-  std::string text;
-  for (const auto& entry : list) text += (text.empty() ? "" : ", ") + print(entry);
-  return "[" + text + "]";
-}
+  std::string print(const Motions& motions) const
+  {
+    std::string text;
+    for (std::size_t i = 0; i < 6; ++i)
+      if (motions[i]) text += std::string(text.empty() ? "" : " ") + motion_words[i];
+    return print(text.empty() ? no_motions : text);
+  }
 
-std::string print(const std::vector<int>& list)
-{
-  return list.size() == 1 ? print(list.front()) : print<>(list);
-}
+  std::string print(const MeasuredRatio& measured) const
+  {
+    const std::string frequency = print(measured.frequency_hz), ratio = print(measured.ratio);
+    return "[" + frequency + ", " + ratio + "]";
+  }
 
-std::string print(const FactorTable& factor)
-{
-  std::vector<std::array<double, 2>> rows;
-  for (std::size_t i = 0; i < factor.at.size(); ++i) rows.push_back({factor.at[i], factor.value[i]});
-  return print(rows);
-}
+  /// A vector, or a list of any values.
+  template <std::ranges::range List> std::string print(const List& list) const
+  {
+    std::string text;
+    for (const auto& entry : list) text += (text.empty() ? "" : ", ") + print(entry);
+    return "[" + text + "]";
+  }
 
-std::string print(const std::optional<Vec3>& vector)
-{
-  return print(*vector);
-}
+  std::string print(const std::vector<int>& list) const
+  {
+    return list.size() == 1 ? print(list.front()) : print<>(list);
+  }
 
-std::string print(const std::map<std::string, double>& table)
-{
-  std::string text;
-  for (const auto& [key, value] : table) text += (text.empty() ? " " : ", ") + print(key) + " = " + print(value);
-  return "{" + text + " }";
-}
+  std::string print(const FactorTable& factor) const
+  {
+    std::vector<std::array<double, 2>> rows;
+    for (std::size_t i = 0; i < factor.at.size(); ++i) rows.push_back({factor.at[i], factor.value[i]});
+    return print(rows);
+  }
 
-template <class Part, class Member> std::string print(const MemberTarget<Part, Member>& target)
-{
-  return print((**target.part).*target.member);
-}
+  std::string print(const std::optional<Vec3>& vector) const { return print(*vector); }
 
-std::string print(const Choice& target)
-{
-  return print(std::string(target.words[target.get(target.member)]));
-}
+  std::string print(const std::map<std::string, double>& table) const
+  {
+    std::string text;
+    for (const auto& [key, value] : table) text += (text.empty() ? " " : ", ") + print(key) + " = " + print(value);
+    return "{" + text + " }";
+  }
 
-std::string print(const StartTarget& target)
-{
-  return target.file->empty() ? print(target.kind) : print(*target.file);
-}
+  template <class Part, class Member> std::string print(const MemberTarget<Part, Member>& target) const
+  {
+    return print((**target.part).*target.member);
+  }
 
-std::string value_text(const SceneKey& key);
+  std::string print(const Choice& target) const { return print(std::string(target.words[target.get(target.member)])); }
 
-/// The form with braces.
-std::string print(const TableTarget& target)
-{
-  std::string text;
-  for (const SceneKey& key : target.entry(0).keys)
-    if (!is_absent(key)) text += (text.empty() ? " " : ", ") + key.name + " = " + value_text(key);
-  return "{" + text + " }";
-}
+  std::string print(const StartTarget& target) const
+  {
+    return target.file->empty() ? print(target.kind) : print(*target.file);
+  }
 
-/// The TOML text of a key's value; empty if it is left out, since its default means the same.
-std::string value_text(const SceneKey& key)
-{
-  if (is_absent(key)) return "";
-  return std::visit(
-      [](const auto& target)
-      {
-        if constexpr (std::is_pointer_v<std::remove_cvref_t<decltype(target)>>)
-          return print(*target);
-        else
-          return print(target);
-      },
-      key.target);
-}
+  /// The form with braces.
+  std::string print(const TableTarget& target) const
+  {
+    std::string text;
+    for (const SceneKey& key : target.entry(0).keys)
+      if (!is_absent(key)) text += (text.empty() ? " " : ", ") + key.name + " = " + value_text(key);
+    return "{" + text + " }";
+  }
+
+  std::map<const double*, std::string> names_;
+};
 
 /// Whether a key is a table with a heading of its own.
 bool is_section(const SceneKey& key)
@@ -134,12 +134,12 @@ bool is_section(const SceneKey& key)
 }
 
 /// The lines "key = value # unit" of a table.
-std::string table_text(const SceneKeys& keys)
+std::string table_text(const Printer& printer, const SceneKeys& keys)
 {
   std::string text;
   for (const SceneKey& key : keys)
     if (!is_section(key) && !is_absent(key))
-      text += key.name + " = " + value_text(key) + (has_unit(key.unit) ? "  # " + key.unit : "") + "\n";
+      text += key.name + " = " + printer.value_text(key) + (has_unit(key.unit) ? "  # " + key.unit : "") + "\n";
   return text;
 }
 
@@ -172,7 +172,8 @@ std::string rule_text(const SceneKey& key)
 }
 
 /// A section of the page of keys: heading, and a row for each key.
-std::string page_table(const std::string& head, const std::string& meaning, const SceneKeys& keys)
+std::string page_table(const Printer& printer, const std::string& head, const std::string& meaning,
+                       const SceneKeys& keys)
 {
   static constexpr std::array effects = {"",        "load", "friction",        "gap", "drive",
                                          "damping", "mass", "stiffness, mass", "mesh"};
@@ -181,8 +182,8 @@ std::string page_table(const std::string& head, const std::string& meaning, cons
   for (const SceneKey& key : keys)
     if (!is_section(key))
       text += markdown_row({markdown_code(key.name), key.unit,
-                            key.need == Need::required ? "required" : markdown_code(value_text(key)), rule_text(key),
-                            effects.at(static_cast<std::size_t>(key.effect)), key.meaning});
+                            key.need == Need::required ? "required" : markdown_code(printer.value_text(key)),
+                            rule_text(key), effects.at(static_cast<std::size_t>(key.effect)), key.meaning});
   return text;
 }
 
@@ -191,14 +192,15 @@ std::string page_table(const std::string& head, const std::string& meaning, cons
 std::string resolved_scene(const Scene& scene)
 {
   Scene copy = scene; // keys bind members that can be written
+  const Printer printer(copy);
   const SceneKeys keys = keys_of(copy);
-  std::string text = table_text(keys);
+  std::string text = table_text(printer, keys);
   for (const SceneKey& key : keys)
     if (is_section(key))
       for (std::size_t i = 0; i < std::get<TableTarget>(key.target).size(); ++i)
       {
         const std::string heading = heading_of(key);
-        text += "\n" + heading + "\n" + table_text(std::get<TableTarget>(key.target).entry(i).keys);
+        text += "\n" + heading + "\n" + table_text(printer, std::get<TableTarget>(key.target).entry(i).keys);
       }
   return text;
 }
@@ -218,19 +220,20 @@ std::vector<std::string> scene_key_names()
 std::string scene_reference()
 {
   Scene scene;
+  const Printer printer(scene);
   const SceneKeys keys = keys_of(scene);
-  std::string text = page_table("scene", "at the top of the file", keys);
+  std::string text = page_table(printer, "scene", "at the top of the file", keys);
   std::map<std::string, SceneKeys> in_braces;
   for (const SceneKey& key : keys)
     if (is_section(key))
     {
       const SceneKeys own = keys_of_table(std::get<TableTarget>(key.target));
-      text += page_table(heading_of(key), key.meaning, own);
+      text += page_table(printer, heading_of(key), key.meaning, own);
       for (const SceneKey& one : own)
         if (const auto* table = std::get_if<TableTarget>(&one.target)) in_braces[one.name] = keys_of_table(*table);
     }
   for (const auto& [name, own] : in_braces)
-    text += page_table(name + " = { … }", "in the braces of a key, which says what its numbers change", own);
+    text += page_table(printer, name + " = { … }", "in the braces of a key, which says what its numbers change", own);
   return text;
 }
 

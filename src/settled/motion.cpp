@@ -20,19 +20,18 @@ MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencie
     return {
         MotionKind::undecided, "quasi-periodic and weakly irregular",
         "neither the probe that swings most nor the normal force shows a second frequency: a [[probe]] elsewhere, or "
-        "more periods (-settled_periods)"};
+        "more periods"};
   if (base.explained < 0.8)
     return {MotionKind::undecided, "quasi-periodic and weakly irregular",
-            format("%.0f %% of the side bands are at combinations of two frequencies: more periods would decide "
-                   "(-settled_periods)",
+            format("%.0f %% of the side bands are at combinations of two frequencies: more periods would decide",
                    100 * base.explained)};
   // Had the modulation decayed to a half, the window would show it.
   const double slowest = std::log(2.) / length;
   if (decay.value - decay.error <= 0 && decay.value + decay.error < slowest)
     return {MotionKind::quasi_periodic, "", ""};
   return {MotionKind::undecided, "quasi-periodic and a slow decay to a cycle",
-          format("the modulation decays by %.1e +- %.1e a period: %.0f periods more would decide (-settled_periods)",
-                 decay.value, decay.error, 3 / std::max({decay.value, decay.error, 1e-6}))};
+          format("the modulation decays by %.1e +- %.1e a period: %.0f periods more would decide", decay.value,
+                 decay.error, 3 / std::max({decay.value, decay.error, 1e-6}))};
 }
 
 /// Of an exponent above zero. A mean's bar comes from batches, and a series shorter than some 50 correlation times has
@@ -43,8 +42,7 @@ MotionVerdict judge_irregular(std::span<const double> energies)
   const double needed = enough * correlation_time(energies);
   if (static_cast<double>(energies.size()) >= needed) return {MotionKind::irregular, "", ""};
   return {MotionKind::undecided, "an irregular motion and one that still changes",
-          format("its energy wanders slowly, and means may be off by more than their bars: %.2g periods would decide "
-                 "(-settled_periods)",
+          format("its energy wanders slowly, and means may be off by more than their bars: %.2g periods would decide",
                  needed)};
 }
 
@@ -143,7 +141,7 @@ void examine(const TangentBundle& bundle, double window, const MotionSeries& ser
 MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<const double> energies,
                            const BaseFrequencies& base)
 {
-  const std::string more = "more periods would decide (-settled_periods)";
+  const std::string more = "more periods would decide";
   if (!is_stationary(energies))
     return {MotionKind::undecided, "a motion that still changes and one that wanders slowly", more};
   if (exponents.empty()) return {MotionKind::undecided, "all kinds, without Lyapunov exponents", more};
@@ -183,7 +181,10 @@ ExaminedMotion examine_motion(const Flow& flow, const ObservedMotion& observed, 
       progress.update(static_cast<double>(++motion.windows), format("energy %.4g", energy));
     }
     examine(bundle, observed.window, observed.series(), motion);
-    if (motion.verdict.kind != MotionKind::undecided || target == most) return motion;
+    if (motion.verdict.kind != MotionKind::undecided) return motion;
+    if (target < most) continue;
+    motion.verdict.would_decide += format(" (-settled_periods %zu)", 4 * most);
+    return motion;
   }
 }
 

@@ -202,8 +202,9 @@ void leave_to_finer_steps(SettledMotion& motion, const std::string& seen)
   verdict.between =
       format("%s and what finer steps than %d a period would show", word(verdict.kind), motion.steps_per_period);
   verdict.would_decide = (seen.empty() ? "" : seen + ": ") +
-                         std::string("steps that change neither the energy nor the largest exponent would decide "
-                                     "(cycle.steps_per_period)");
+                         format("steps that change neither the energy nor the largest exponent would decide "
+                                "(--set cycle.steps_per_period=%d)",
+                                4 * motion.steps_per_period);
   verdict.kind = MotionKind::undecided;
   note_undecided(motion);
 }

@@ -99,13 +99,6 @@ SeenGrowth growth_of(const BesideMotion& motion, std::vector<double> distances, 
 
 } // namespace
 
-bool is_largest_alone(const Multipliers& multipliers)
-{
-  for (std::size_t i = 1; i < multipliers.values.size(); ++i)
-    if (multipliers.values[i] != std::conj(multipliers.values[0]) && !(multipliers.upper_bound(i) < 1)) return false;
-  return true;
-}
-
 Owned<Vec> state_beside(const OrbitProblem& problem, const Orbit& orbit, Vec fastest, double part)
 {
   const Owned<Vec> fluctuation = fluctuation_of(problem, orbit);
@@ -170,7 +163,8 @@ void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipli
     return;
   }
   if (multipliers.stability != Stability::undecided || !multipliers.complete) return;
-  if (!is_largest_alone(multipliers)) return;
+  for (std::size_t i = 1; i < multipliers.values.size(); ++i)
+    if (multipliers.values[i] != std::conj(multipliers.values[0]) && !(multipliers.upper_bound(i) < 1)) return;
   // a grid of time moves a shift along the orbit, which nothing moves, and so any other motion that nothing moves
   const std::complex<double> largest = multipliers.values.front();
   const double of_grid = largest.imag() == 0 && largest.real() > 0 ? multipliers.trivial_error : 0;

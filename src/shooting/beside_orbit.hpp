@@ -27,9 +27,6 @@ std::vector<double> distances_beside(const OrbitProblem& problem, ConvergenceLog
 std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
                                        const FloquetAnalysis& floquet, long periods);
 
-/// Whether all multipliers but the largest and its conjugate are below 1 by their bounds. Not collective.
-bool is_largest_alone(const Multipliers& multipliers);
-
 /// Decides what only the bar of the largest multiplier leaves undecided, where a motion along it was seen to grow or to
 /// decay beyond its own bar. "Stable" is undecided where one was seen to grow.
 void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers);

@@ -197,6 +197,11 @@ std::string label_of(const Connector& connector)
   return "connector from " + connector.from + " to " + connector.to;
 }
 
+void hold(Constraints& constraints, const Mesh& mesh, const Support& support)
+{
+  for (const int node : named_nodes(mesh, support.on, "support")) hold_node(constraints, mesh, support, node);
+}
+
 void add_couplings(Constraints& constraints, const Mesh& mesh, const std::vector<Coupling>& couplings)
 {
   for (const Coupling& coupling : couplings) add_coupling(constraints, mesh, coupling);
@@ -205,8 +210,7 @@ void add_couplings(Constraints& constraints, const Mesh& mesh, const std::vector
 void add_rows(Constraints& constraints, const Mesh& mesh, const Scene& scene)
 {
   for (const Support& support : scene.supports)
-    if (!is_plain(support))
-      for (const int node : named_nodes(mesh, support.on, "support")) hold_node(constraints, mesh, support, node);
+    if (!is_plain(support)) hold(constraints, mesh, support);
   for (const Connector& connector : scene.connectors) lock(constraints, mesh, connector);
 }
 

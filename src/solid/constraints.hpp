@@ -62,9 +62,13 @@ std::string label_of(const Connector& connector);
 /// with r_i from the weighted centroid c and I = sum w_i (|r_i|^2 1 - r_i r_i'). Throws Error for nodes on a line.
 void add_couplings(Constraints& constraints, const Mesh& mesh, const std::vector<Coupling>& couplings);
 
-/// The motions that supports hold in frames of their own or move, and those that connectors lock. Each row is solved
-/// for the free motion of its largest factor; one that the others imply is left out. Throws Error for one that
-/// contradicts them.
+/// The motions that a support holds or moves. Each is a row, solved for the free motion of its largest factor: of a
+/// node of a rigid body it holds the body. One that others imply is left out. Throws Error for one that contradicts
+/// them.
+void hold(Constraints& constraints, const Mesh& mesh, const Support& support);
+
+/// The motions that supports hold in frames of their own or move, and those that connectors lock, as rows of the same
+/// kind.
 void add_rows(Constraints& constraints, const Mesh& mesh, const Scene& scene);
 
 } // namespace squeal

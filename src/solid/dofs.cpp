@@ -101,23 +101,6 @@ void add_rigid_bodies(Constraints& constraints, const Mesh& mesh, const std::vec
   }
 }
 
-/// Throws Error if a supported component depends on a free one of a rigid body. A support is allowed where the body is
-/// fixed too.
-void check_supported_dependent(const Constraints& constraints, const Mesh& mesh, const Scene& scene,
-                               const std::string& support, PetscInt nodal_dof)
-{
-  const auto dependent = constraints.dependent.find(nodal_dof);
-  if (dependent == constraints.dependent.end()) return;
-  const int node = static_cast<int>(nodal_dof / 6);
-  for (const ConstraintTerm& term : dependent->second)
-    if (term.factor != 0 && constraints.kind[term.nodal_dof] == DofKind::free)
-      throw Error(node_text(node, mesh.nodes[node]) + ": the support on " + support + " holds its " +
-                  motion_words[nodal_dof % 6] + ", which rigid body " +
-                  scene.rigid_bodies[constraints.body_of.at(node)].name + " moves by its " +
-                  motion_words[term.nodal_dof % 6] +
-                  "; take the node out of the support, or put the support on the body");
-}
-
 /// Throws Error if a support fixes nothing.
 void check_effective(Constraints& constraints, const Mesh& mesh, const Support& support)
 {
@@ -128,24 +111,12 @@ void check_effective(Constraints& constraints, const Mesh& mesh, const Support& 
               ": none of its nodes has a motion that it fixes (nodes of solids have x y z, of shells rx ry rz too)");
 }
 
+/// Supports along the axes of the scene. They come before ties, so that what they hold stays held.
 void add_supports(Constraints& constraints, const Mesh& mesh, const Scene& scene)
 {
-  const auto for_each_supported = [&](auto work)
-  {
-    for (const Support& support : scene.supports)
-      for (const int node : named_nodes(mesh, support.on, "support"))
-        for (int c = 0; c < 6 && is_plain(support); ++c)
-          if (support.fixed[c]) work(support.on, 6 * PetscInt{node} + c);
-  };
   for (const Support& support : scene.supports) check_effective(constraints, mesh, support);
-  for_each_supported(
-      [&](const std::string&, PetscInt nodal_dof)
-      {
-        DofKind& kind = constraints.kind[nodal_dof];
-        if (kind == DofKind::free) kind = DofKind::fixed;
-      });
-  for_each_supported([&](const std::string& support, PetscInt nodal_dof)
-                     { check_supported_dependent(constraints, mesh, scene, support, nodal_dof); });
+  for (const Support& support : scene.supports)
+    if (is_plain(support)) hold(constraints, mesh, support);
 }
 
 /// The rotation of a tied node, about `axis`, by the curl of the others' motion.

@@ -1,5 +1,6 @@
 #include "following.hpp"
 
+#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 
 #include <algorithm>
@@ -202,14 +203,6 @@ ModeForms forms_between(const PointModes& from, const PointModes& to)
   return {form(from, to, last), form(to, from, last), form(from, from, last), form(to, to, last)};
 }
 
-ModeForms overlaps_between(const PointModes& from, const PointModes& to)
-{
-  const MatrixXd& M = (from.M.rows() > to.M.rows() ? from : to).M;
-  const MatrixXcd a = padded(from, &TwoSidedPair::right, M.rows()), b = padded(to, &TwoSidedPair::right, M.rows());
-  const MatrixXcd M_a = real_times(M, a), M_b = real_times(M, b);
-  return {a.adjoint() * M_b, b.adjoint() * M_a, a.adjoint() * M_a, b.adjoint() * M_b};
-}
-
 ModeForms forms_between(const ExpandedModes& from, const ExpandedModes& to, Mat M, Mat C)
 {
   ModeForms forms;
@@ -253,31 +246,17 @@ std::vector<Match> follow(const ModeForms& forms, double clear)
   return matches;
 }
 
-void match_coincident(std::vector<Match>& matches, const std::vector<TwoSidedPair>& from,
-                      const std::vector<TwoSidedPair>& to)
+std::vector<int> nearest_partners(const std::vector<Complex>& from, const std::vector<Complex>& to)
 {
-  constexpr double coincidence = 1e-5; // of |lambda|: the least tolerance leaves most within 7e-8
-  std::vector<char> kept_from(from.size(), 0), kept_to(to.size(), 0);
-  for (std::size_t i = 0; i < matches.size(); ++i)
-    if (matches[i].to >= 0 && matches[i].mac >= clear_mac)
-      kept_from[i] = kept_to[static_cast<std::size_t>(matches[i].to)] = 1;
-  const auto nearest =
-      [](const TwoSidedPair& pair, const std::vector<TwoSidedPair>& others, const std::vector<char>& taken)
-  {
-    const Places open = places_left(static_cast<Index>(others.size()), taken);
-    const auto distance = [&](Index j) { return std::abs(others[static_cast<std::size_t>(j)].lambda - pair.lambda); };
-    const auto found = std::ranges::min_element(open, {}, distance);
-    return found != open.end() && distance(*found) < coincidence * std::abs(pair.lambda) ? *found : Index{-1};
-  };
-  for (std::size_t i = 0; i < from.size(); ++i)
-  {
-    if (kept_from[i]) continue;
-    const Index j = nearest(from[i], to, kept_to);
-    if (j < 0 || nearest(to[static_cast<std::size_t>(j)], from, kept_from) != static_cast<Index>(i)) continue;
-    for (Match& match : matches)
-      if (match.to == static_cast<int>(j)) match.to = -1;
-    matches[i].to = static_cast<int>(j);
-  }
+  const bool all = from.size() <= to.size(); // the shorter list has partners
+  const std::vector<std::size_t> places = all ? nearest_places(from, to) : nearest_places(to, from);
+  std::vector<int> partners(from.size(), -1);
+  for (std::size_t k = 0; k < places.size(); ++k)
+    if (all)
+      partners[k] = static_cast<int>(places[k]);
+    else
+      partners[places[k]] = static_cast<int>(k);
+  return partners;
 }
 
 } // namespace squeal

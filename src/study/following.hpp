@@ -31,10 +31,6 @@ inline constexpr double clear_mac = 0.9;
 /// The same where other pairs are closed: modes jump there. More than half of a mode is in one other alone.
 inline constexpr double clear_mac_across = 0.6;
 
-/// The same for the overlap of modes of opposite directions of rotation, which falls near lock-in. On the pin with two
-/// divisions at mu = 0.05 modes share at least 0.33 with themselves, and less than 0.05 with others [6ea0b68].
-inline constexpr double clear_overlap = 0.25;
-
 /// How near a ratio is to 1: one above 1 is as far off as its inverse. Of a ratio of the form b it is the MAC.
 double folded(double ratio);
 
@@ -51,14 +47,10 @@ Eigen::MatrixXd all_macs(const ModeForms& forms);
 /// On the basis that both points share; equal pairs are closed. Not collective.
 ModeForms forms_between(const PointModes& from, const PointModes& to);
 
-/// Products y^H M y' of right vectors, in place of b: between opposite directions of rotation. Turning friction round
-/// turns right into left vectors, so that b would match a mode with its partner near lock-in. Not collective.
-ModeForms overlaps_between(const PointModes& from, const PointModes& to);
-
-/// Of modes that share less than `clear_mac`, those are matched whose eigenvalues are each other's nearest and coincide
-/// to 1e-5, as in the mirror image of a scene. Between opposite directions of rotation. Not collective.
-void match_coincident(std::vector<Match>& matches, const std::vector<TwoSidedPair>& from,
-                      const std::vector<TwoSidedPair>& to);
+/// For each eigenvalue of one list its partner in another, the nearest, each at most once; -1: the other is shorter.
+/// Not collective.
+std::vector<int> nearest_partners(const std::vector<std::complex<double>>& from,
+                                  const std::vector<std::complex<double>>& to);
 
 /// Modes in the structure's degrees of freedom, as `expanded` gives them.
 struct ExpandedModes

@@ -41,7 +41,9 @@ std::vector<std::vector<double>> random_points(const SweepSettings& settings)
 std::vector<SweepLine> lines_of(const SweepSettings& settings)
 {
   std::vector<SweepLine> lines;
-  if (settings.samples > 0)
+  if (!settings.design.empty())
+    lines.push_back({settings.design, false, false});
+  else if (settings.samples > 0)
     lines.push_back({random_points(settings), false, false});
   else if (settings.key.size() == 1)
   {

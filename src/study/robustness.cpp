@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <ranges>
+#include <utility>
 
 namespace squeal
 {
@@ -172,14 +173,14 @@ public:
 
   /// Finds the pairs that stay closed at the first samples, then the modes of the medians. Without these, modes are
   /// like none of the reference.
-  void prepare(const std::vector<RobustSample>& samples)
+  void prepare(std::span<const SampleResult> samples)
   {
     const std::vector<double> medians(problem_.numbers.size(), 0.5);
     const SweptPlace middle{values_at(problem_.numbers, medians)};
     model_.prepare(middle);
-    for (const RobustSample& sample : std::span(samples).first(std::min(samples.size(), prepared)))
-      model_.prepare({sample.values});
-    find_tolerance(std::span(samples).first(std::min(samples.size(), prepared)));
+    samples = samples.first(std::min(samples.size(), prepared));
+    for (const SampleResult& result : samples) model_.prepare({result.sample.values});
+    find_tolerance(samples);
     (void)error_of([&] { reference_ = Reference(modes_at(middle)); });
   }
 
@@ -191,9 +192,10 @@ public:
     return modes;
   }
 
-  /// Sets what is found at the values of a sample; its unstable modes join the list. Error: as of modes_of.
-  void evaluate(int place, RobustSample& sample, std::vector<UnstableMode>& unstable)
+  /// Sets what is found at the values of a sample. Error: as of modes_of.
+  void evaluate(SampleResult& result)
   {
+    RobustSample& sample = result.sample;
     const SweptPlace at{sample.values};
     const PointModes modes = modes_at(at);
     const std::vector<int> names = reference_.nearest_to(modes);
@@ -207,7 +209,7 @@ public:
       if (first) worst = lambda;
       if (!is_unstable(lambda)) continue;
       if (first) sample.mode = names[k];
-      unstable.push_back({place, names[k], lambda});
+      result.unstable.push_back({names[k], lambda});
       ++sample.unstable;
     }
     sample.growth_rate = worst.real();
@@ -220,29 +222,34 @@ public:
 
 private:
   /// Tightens the tolerance until the error of these samples' eigenvalues is a part of what their growth rates scatter
-  /// by. What a larger basis changes is the error on the smaller one; errors fall as the product of those of both
-  /// vectors.
-  void find_tolerance(std::span<const RobustSample> samples)
+  /// by. What a larger basis changes is the error on the smaller one, which is taken where that is small enough: the
+  /// work of a sample grows with the cube of the shapes. Errors fall as the product of those of both vectors.
+  void find_tolerance(std::span<const SampleResult> samples)
   {
     SampledModes coarse = modes_of(samples);
     while (tolerance_ > close_tolerance)
     {
       const Index shapes = model_.shapes();
-      tolerance_ = std::max(close_tolerance, tolerance_ / 10);
+      const double before = std::exchange(tolerance_, std::max(close_tolerance, tolerance_ / 10));
       SampledModes fine = modes_of(samples);
-      const double reduction = std::pow(fine.backward_error / coarse.backward_error, 2);
-      if (model_.shapes() > shapes &&
-          largest_shift(coarse, fine, problem_.modes.band) * reduction <= problem_.accuracy * scatter_of(fine))
-        return;
+      const double shift = largest_shift(coarse, fine, problem_.modes.band),
+                   enough = problem_.accuracy * scatter_of(fine),
+                   reduction = std::pow(fine.backward_error / coarse.backward_error, 2);
+      if (model_.shapes() > shapes && shift <= enough)
+      {
+        tolerance_ = before;
+        return model_.truncate(shapes);
+      }
+      if (model_.shapes() > shapes && shift * reduction <= enough) return;
       coarse = std::move(fine);
     }
   }
 
   /// Empty where a sample has none.
-  SampledModes modes_of(std::span<const RobustSample> samples)
+  SampledModes modes_of(std::span<const SampleResult> samples)
   {
     SampledModes found;
-    for (const RobustSample& sample : samples)
+    for (const auto& [sample, unstable, problem] : samples)
     {
       std::vector<Complex>& lambda = found.lambda.emplace_back();
       (void)error_of(
@@ -320,22 +327,21 @@ void compare(const std::vector<Complex>& reduced, const std::vector<Complex>& fu
   check.unstable = static_cast<int>(std::ranges::count_if(full, is_unstable));
 }
 
-/// Calls work(k) for this rank's share of so many samples, between requests to end. Returns the first that failed, on
-/// every rank. Collective.
-template <class Work> SampleFailure for_own(int count, MPI_Comm comm, Progress& progress, Work work)
+/// Does work(k) for this rank's share of so many results, between requests to end, and gives every rank all results.
+/// What fails has its reason. Collective.
+template <class Result, class Work>
+void find_all(std::vector<Result>& results, const char* what, MPI_Comm comm, Work work)
 {
-  constexpr int between = 16;
-  SampleFailure first;
-  const int ranks = ranks_of(comm), rank = rank_of(comm);
-  for (int step = 0; step * ranks < count; ++step)
+  constexpr std::size_t between = 16;
+  const auto ranks = static_cast<std::size_t>(ranks_of(comm)), rank = static_cast<std::size_t>(rank_of(comm));
+  Progress progress(comm, what, static_cast<double>(results.size()));
+  for (std::size_t step = 0; step * ranks < results.size(); ++step)
   {
     if (step % between == 0) end_if_asked(comm);
-    if (const int k = step * ranks + rank; k < count)
-      if (const std::string error = error_of([&] { work(k); }); !error.empty() && first.reason.empty())
-        first = {k, error};
-    progress.update(std::min(count, (step + 1) * ranks), "");
+    if (const std::size_t k = step * ranks + rank; k < results.size()) results[k].problem = error_of([&] { work(k); });
+    progress.update(static_cast<double>(std::min(results.size(), (step + 1) * ranks)), "");
   }
-  return first_of_ranks(first, comm);
+  share_in_turn(results, comm);
 }
 
 } // namespace
@@ -343,38 +349,28 @@ template <class Work> SampleFailure for_own(int count, MPI_Comm comm, Progress& 
 Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
 {
   const Finally alone = one_thread(); // points are many dense problems of a few hundred rows
-  Robustness result;
-  for (std::vector<double>& values : random_values(problem, comm)) result.samples.push_back({std::move(values)});
-  for (int k = 0; k < problem.settings.checks; ++k) result.checks.push_back({k});
+  std::vector<SampleResult> samples;
+  for (std::vector<double>& values : random_values(problem, comm)) samples.push_back({{std::move(values)}});
   Sampler sampler(problem);
-  sampler.prepare(result.samples);
-  std::vector<UnstableMode> unstable;
-  SampleFailure failed;
+  sampler.prepare(samples);
+  find_all(samples, "robustness", comm, [&](std::size_t k) { sampler.evaluate(samples[k]); });
+  std::vector<CheckResult> checks(static_cast<std::size_t>(problem.settings.checks));
+  const auto check = [&](std::size_t k)
   {
-    Progress progress(comm, "robustness", problem.settings.samples);
-    failed = for_own(problem.settings.samples, comm, progress,
-                     [&](int k) { sampler.evaluate(k, result.samples[static_cast<std::size_t>(k)], unstable); });
-  }
-  {
-    Progress progress(comm, "robustness: checks", problem.settings.checks);
-    const SampleFailure check_failed = for_own(problem.settings.checks, comm, progress,
-                                               [&](int k)
-                                               {
-                                                 RobustCheck& check = result.checks[static_cast<std::size_t>(k)];
-                                                 const auto& values =
-                                                     result.samples[static_cast<std::size_t>(k)].values;
-                                                 compare(sampler.modes_of(values), full_modes(problem, values), check);
-                                                 check.known = true;
-                                               });
-    if (failed.reason.empty()) failed = check_failed;
-  }
-  share_in_turn(result.samples, comm);
-  share_in_turn(result.checks, comm);
-  share(unstable, comm);
-  find_probabilities(result, unstable, sampler.reference().eigenvalues(), problem.settings.confidence);
+    RobustCheck& found = checks[k].check;
+    const std::vector<double>& values = samples[k].sample.values;
+    found.sample = static_cast<int>(k);
+    compare(sampler.modes_of(values), full_modes(problem, values), found);
+    found.known = true;
+  };
+  find_all(checks, "robustness: checks", comm, check);
+  Robustness result;
+  for (SampleResult& sample : samples) result.samples.push_back(std::move(sample.sample));
+  for (const CheckResult& one : checks) result.checks.push_back(one.check);
+  find_probabilities(result, samples, sampler.reference().eigenvalues(), problem.settings.confidence);
   find_correlations(result, problem.numbers.size());
   result.basis = static_cast<int>(sampler.shapes());
-  assess(result, failed);
+  assess(result, samples, checks);
   return result;
 }
 

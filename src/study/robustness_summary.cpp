@@ -1,12 +1,9 @@
 #include "robustness_summary.hpp"
 
-#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 
 #include <algorithm>
 #include <boost/math/distributions/binomial.hpp>
-#include <iterator>
-#include <limits>
 #include <numeric>
 
 namespace squeal
@@ -52,30 +49,23 @@ Probability probability_of(int count, int samples, double confidence)
   return result;
 }
 
-void describe(Checkpoint& checkpoint, RobustSample& sample)
-{
-  describe_all(checkpoint, sample.values, sample.known, sample.closed, sample.unstable, sample.growth_rate,
-               sample.frequency_hz, sample.mode);
-}
-
-void describe(Checkpoint& checkpoint, RobustCheck& check)
-{
-  describe_all(checkpoint, check.sample, check.known, check.unstable, check.unstable_reduced, check.growth_error,
-               check.frequency_error);
-}
-
 void describe(Checkpoint& checkpoint, UnstableMode& mode)
 {
-  describe_all(checkpoint, mode.sample, mode.mode, mode.lambda);
+  describe_all(checkpoint, mode.mode, mode.lambda);
 }
 
-void share(std::vector<UnstableMode>& modes, MPI_Comm comm)
+void describe(Checkpoint& checkpoint, SampleResult& result)
 {
-  std::vector<UnstableMode> all;
-  for (int rank = 0; rank < ranks_of(comm); ++rank)
-    std::ranges::copy(of_rank(rank, modes, comm), std::back_inserter(all));
-  modes = std::move(all);
-  std::ranges::stable_sort(modes, {}, &UnstableMode::sample);
+  RobustSample& sample = result.sample;
+  describe_all(checkpoint, sample.values, sample.known, sample.closed, sample.unstable, sample.growth_rate,
+               sample.frequency_hz, sample.mode, result.unstable, result.problem);
+}
+
+void describe(Checkpoint& checkpoint, CheckResult& result)
+{
+  RobustCheck& check = result.check;
+  describe_all(checkpoint, check.sample, check.known, check.unstable, check.unstable_reduced, check.growth_error,
+               check.frequency_error, result.problem);
 }
 
 void find_correlations(Robustness& result, std::size_t numbers)
@@ -91,7 +81,7 @@ void find_correlations(Robustness& result, std::size_t numbers)
   for (const std::vector<double>& of_number : values) result.correlation.push_back(rank_correlation(of_number, growth));
 }
 
-void find_probabilities(Robustness& result, const std::vector<UnstableMode>& unstable,
+void find_probabilities(Robustness& result, const std::vector<SampleResult>& samples,
                         const std::vector<Complex>& reference, double confidence)
 {
   const auto known = static_cast<int>(std::ranges::count(result.samples, true, &RobustSample::known));
@@ -100,14 +90,17 @@ void find_probabilities(Robustness& result, const std::vector<UnstableMode>& uns
   for (int mode = unmatched; mode < to_int(reference.size()); ++mode)
   {
     RobustMode robust;
-    int count = 0, last = -1;
-    for (const UnstableMode& one : unstable)
+    int count = 0;
+    for (const SampleResult& sample : samples)
     {
-      if (one.mode != mode) continue;
-      robust.growth_rates.push_back(one.lambda.real());
-      robust.frequencies.push_back(frequency_hz_of(one.lambda));
-      count += one.sample != last;
-      last = one.sample;
+      const std::size_t before = robust.frequencies.size();
+      for (const UnstableMode& one : sample.unstable)
+      {
+        if (one.mode != mode) continue;
+        robust.growth_rates.push_back(one.lambda.real());
+        robust.frequencies.push_back(frequency_hz_of(one.lambda));
+      }
+      count += robust.frequencies.size() > before;
     }
     if (count == 0) continue;
     if (mode != unmatched) robust.lambda = reference[static_cast<std::size_t>(mode)];
@@ -120,31 +113,26 @@ void find_probabilities(Robustness& result, const std::vector<UnstableMode>& uns
   std::ranges::stable_sort(result.modes, std::greater{}, [](const RobustMode& mode) { return mode.unstable.count; });
 }
 
-SampleFailure first_of_ranks(SampleFailure own, MPI_Comm comm)
+void assess(Robustness& result, const std::vector<SampleResult>& samples, const std::vector<CheckResult>& checks)
 {
-  struct
-  {
-    int sample, rank;
-  } first{own.reason.empty() ? std::numeric_limits<int>::max() : own.sample, rank_of(comm)};
-  MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_2INT, MPI_MINLOC, comm);
-  own.sample = first.sample;
-  broadcast(own.reason, comm, first.rank);
-  return own;
-}
-
-void assess(Robustness& result, const SampleFailure& first)
-{
-  const auto unknown = std::ranges::count(result.samples, false, &RobustSample::known);
-  const auto failed = std::ranges::count(result.checks, false, &RobustCheck::known);
   for (const RobustCheck& check : result.checks)
     result.outcome.residual = std::max(result.outcome.residual, check.growth_error);
-  result.outcome.iterations = static_cast<int>(result.samples.size());
-  result.outcome.kind = unknown + failed > 0 ? OutcomeKind::not_converged : OutcomeKind::converged;
-  if (unknown + failed > 0)
-    result.outcome.reason =
-        format("%ld of %zu samples and %ld of %zu checks failed, the first at sample %d: ", static_cast<long>(unknown),
-               result.samples.size(), static_cast<long>(failed), result.checks.size(), first.sample) +
-        first.reason;
+  result.outcome.iterations = static_cast<int>(samples.size());
+  result.outcome.kind = OutcomeKind::converged;
+  std::size_t failed = 0, failed_checks = 0, first = 0;
+  std::string reason;
+  const auto count = [&](const auto& results, std::size_t& number)
+  {
+    for (std::size_t k = 0; k < results.size(); ++k)
+      if (!results[k].problem.empty() && ++number == 1 && reason.empty()) first = k, reason = results[k].problem;
+  };
+  count(samples, failed);
+  count(checks, failed_checks);
+  if (reason.empty()) return;
+  result.outcome.kind = OutcomeKind::not_converged;
+  result.outcome.reason = format("%zu of %zu samples and %zu of %zu checks failed, the first at sample %zu: ", failed,
+                                 samples.size(), failed_checks, checks.size(), first) +
+                          reason;
 }
 
 } // namespace squeal

@@ -11,14 +11,27 @@ inline constexpr int unmatched = -1; // a mode that is like none of the referenc
 /// An unstable mode of a sample.
 struct UnstableMode
 {
-  int sample = 0;
   int mode = unmatched; // of the reference
   std::complex<double> lambda{};
 };
 
-void describe(Checkpoint& checkpoint, RobustSample& sample);
-void describe(Checkpoint& checkpoint, RobustCheck& check);
-void describe(Checkpoint& checkpoint, UnstableMode& mode);
+/// A sample with its unstable modes, or why there are none.
+struct SampleResult
+{
+  RobustSample sample{};
+  std::vector<UnstableMode> unstable{};
+  std::string problem{}; // empty: it is known
+};
+
+/// The same of a check.
+struct CheckResult
+{
+  RobustCheck check{};
+  std::string problem{};
+};
+
+void describe(Checkpoint& checkpoint, SampleResult& result);
+void describe(Checkpoint& checkpoint, CheckResult& result);
 
 /// Gives every rank the entries that each has computed, in turn: the first rank the first of them. Collective.
 template <class Entry> void share_in_turn(std::vector<Entry>& entries, MPI_Comm comm)
@@ -32,27 +45,14 @@ template <class Entry> void share_in_turn(std::vector<Entry>& entries, MPI_Comm 
   }
 }
 
-/// Gives every rank all unstable modes, by samples.
-void share(std::vector<UnstableMode>& modes, MPI_Comm comm);
-
 /// Of so many numbers with the growth rates over |lambda| of the samples whose mode oscillates.
 void find_correlations(Robustness& result, std::size_t numbers);
 
 /// Probabilities of the unstable modes that are one of the reference's, and of any.
-void find_probabilities(Robustness& result, const std::vector<UnstableMode>& unstable,
+void find_probabilities(Robustness& result, const std::vector<SampleResult>& samples,
                         const std::vector<std::complex<double>>& reference, double confidence);
 
-/// A sample that could not be computed, and why; no reason: there is none.
-struct SampleFailure
-{
-  int sample = 0;
-  std::string reason{};
-};
-
-/// The first one of those of all ranks, on every rank. Collective.
-SampleFailure first_of_ranks(SampleFailure own, MPI_Comm comm);
-
-/// Sets the outcome, with the first failure.
-void assess(Robustness& result, const SampleFailure& first);
+/// Sets the outcome, with the first failure of samples, or else of checks.
+void assess(Robustness& result, const std::vector<SampleResult>& samples, const std::vector<CheckResult>& checks);
 
 } // namespace squeal

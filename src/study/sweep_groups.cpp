@@ -1,6 +1,6 @@
 #include "sweep_groups.hpp"
 
-#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "following.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "squeal/base/run_control.hpp"
 #include "sweep_checkpoint.hpp"
@@ -24,14 +24,9 @@ TrackNames names_by(const SweepPoint& here, const SweepPoint& there)
   for (const SweptMode& mode : here.modes) own.push_back(mode.lambda);
   for (const SweptMode& mode : there.modes) known.push_back(mode.lambda);
   TrackNames names;
-  if (known.size() > own.size()) // the nearest of the shorter list: one may stand on the band's end
-  {
-    const std::vector<std::size_t> places = nearest_places(own, known);
-    for (std::size_t i = 0; i < own.size(); ++i) names[here.modes[i].track] = there.modes[places[i]].track;
-    return names;
-  }
-  const std::vector<std::size_t> places = nearest_places(known, own);
-  for (std::size_t i = 0; i < known.size(); ++i) names[here.modes[places[i]].track] = there.modes[i].track;
+  const std::vector<int> partners = nearest_partners(own, known);
+  for (std::size_t i = 0; i < partners.size(); ++i)
+    if (partners[i] >= 0) names[here.modes[i].track] = there.modes[static_cast<std::size_t>(partners[i])].track;
   return names;
 }
 

@@ -159,7 +159,7 @@ private:
     if (own)
       carry_over(*own, now, 0);
     else if (other)
-      take_over(*other, now, matches_turned(*other, now));
+      take_numbers(*other, now);
     begin_anew(now);
     starts_[now.reversed] = now;
   }
@@ -204,12 +204,19 @@ private:
     take_over(before, now, matches);
   }
 
-  /// Between the first points of lines of both directions of rotation.
-  static std::vector<Match> matches_turned(const Followed& before, const Followed& now)
+  /// Of the first point in the other direction of rotation, by the eigenvalues: friction is weak there.
+  static void take_numbers(const Followed& other, Followed& now)
   {
-    std::vector<Match> matches = follow(overlaps_between(before.modes, now.modes), clear_overlap);
-    match_coincident(matches, before.modes.pairs, now.modes.pairs);
-    return matches;
+    const std::vector<int> partners = nearest_partners(eigenvalues(other), eigenvalues(now));
+    for (std::size_t i = 0; i < partners.size(); ++i)
+      if (partners[i] >= 0) now.tracks[static_cast<std::size_t>(partners[i])] = other.tracks[i];
+  }
+
+  static std::vector<std::complex<double>> eigenvalues(const Followed& point)
+  {
+    std::vector<std::complex<double>> values;
+    for (const TwoSidedPair& pair : point.modes.pairs) values.push_back(pair.lambda);
+    return values;
   }
 
   ModeForms forms(const Followed& before, const Followed& now)

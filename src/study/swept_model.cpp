@@ -112,6 +112,12 @@ void SweptModel::train_at(const SweptPlace& place, double tolerance)
   if (modes.outcome.kind == OutcomeKind::converged) trained_[place] = std::move(modes);
 }
 
+void SweptModel::truncate(Eigen::Index shapes)
+{
+  squeal::truncate(*basis_, shapes);
+  trained_.clear();
+}
+
 void SweptModel::forget(const SweptPlace& place)
 {
   known_.erase(place);

@@ -43,6 +43,9 @@ public:
   /// Makes the basis by a point, whose modes are then at hand when they are asked for next.
   void train_at(const SweptPlace& place, double tolerance);
 
+  /// Drops all shapes of the basis but the first ones, so many.
+  void truncate(Eigen::Index shapes);
+
   /// Gives back the memory of a point.
   void forget(const SweptPlace& place);
 

@@ -2,6 +2,7 @@
 
 #include "squeal/base/constants.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace squeal
@@ -22,50 +23,6 @@ std::string mode_refusal(const ComplexMode& mode, double theta, double h)
          (theta > 0.5 ? "look stable: more than 2 pi (theta - 1/2) omega/sigma = "
                       : "owe most of its growth to the step: more than 2 pi (1/2 - theta) omega/sigma = ") +
          format("%.4g steps a period are needed, or theta = 1/2", needed);
-}
-
-/// One step of the free structure in place: A v+ = [M v - (1-theta) A v]/theta - h K u, u+ = u + h v_theta.
-struct FreeStep
-{
-  const Structure& structure;
-  double theta, h;
-  Owned<Mat> A;
-  Factor factor;
-  Owned<Vec> u, v, next, rhs, image;
-
-  void advance()
-  {
-    check(MatMult(structure.M, v, rhs));
-    check(MatMult(A, v, image));
-    check(VecAXPBY(rhs, (theta - 1) / theta, 1 / theta, image));
-    check(MatMult(structure.K, u, image));
-    check(VecAXPY(rhs, -h, image));
-    solve(factor, rhs, next);
-    check(VecAXPY(u, h * (1 - theta), v));
-    check(VecAXPY(u, h * theta, next));
-    std::swap(v, next);
-  }
-
-  /// Scales the state to energy 1 and returns the logarithm of its energy before.
-  double normalise()
-  {
-    const double energy = kinetic_energy(structure, v) + potential_energy(structure, u);
-    if (!(energy > 0)) return 0;
-    check(VecScale(u, 1 / std::sqrt(energy)));
-    check(VecScale(v, 1 / std::sqrt(energy)));
-    return std::log(energy);
-  }
-};
-
-/// Times the root of each pair's weight on its tangential rows, and zero on normal ones.
-void scale_by_roots(const std::vector<double>& weights, int directions, std::vector<double>& x)
-{
-  const PairView<double> scaled(x, directions);
-  for (std::size_t i = 0; i < scaled.pairs(); ++i)
-  {
-    scaled.normal(i) = 0;
-    for (double& entry : scaled.tangential(i)) entry *= std::sqrt(weights[i]);
-  }
 }
 
 /// A step size, below h, with one solution a step; 0 if there is none, as where a pair's nodes have no mass.
@@ -92,81 +49,28 @@ std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double the
   return std::log((1. + (1 - theta) * h * lambda) / (1. - theta * h * lambda)) / h;
 }
 
-double free_growth(const Structure& structure, double theta, double h, const FactorOptions& options)
+std::string step_refusal(const ComplexMode* mode, double theta, double h, const StepOptions& options)
 {
-  FreeStep step{structure, theta, h, {}, {}, {}, {}, {}, {}, {}};
-  step.A = step_matrix(structure, h, theta);
-  step.factor = Factor(step.A, nullptr, options);
-  for (Owned<Vec>* x : {&step.u, &step.v, &step.next, &step.rhs, &step.image}) *x = zeros_like(structure.load);
-  PetscInt first = 0, last = 0;
-  check(VecGetOwnershipRange(step.u, &first, &last));
-  for (PetscInt i = first; i < last; ++i) // no mode is orthogonal to it
-    check(VecSetValue(step.u, i, std::sin(1 + 12.9898 * static_cast<double>(i)), INSERT_VALUES));
-  check(VecAssemblyBegin(step.u));
-  check(VecAssemblyEnd(step.u));
-
-  // The slope of the energy's logarithm: its ripple within a period would spoil a quotient of two energies.
-  constexpr int settling = 100, observed = 200;
-  double grown = 0, slope = 0;
-  for (int i = 0; i < settling + observed; ++i)
-  {
-    step.advance();
-    grown += step.normalise();
-    if (i >= settling) slope += grown * (i - settling - (observed - 1) / 2.);
-  }
-  return slope / (observed * (observed * observed - 1.) / 12) / 2;
-}
-
-std::string step_refusal(const Structure& structure, const ComplexMode* mode, double theta, double h,
-                         const StepOptions& options)
-{
-  if (!options.refuse) return {};
-  if (mode)
-    if (const std::string reason = mode_refusal(*mode, theta, h); !reason.empty()) return reason;
-  if (theta >= 0.5) return {};
-  const double growth = free_growth(structure, theta, h, options.factor);
-  constexpr double negligible = 2e-6; // less than what the fit sees, and no harm in 100 000 steps
-  if (growth <= negligible) return {};
-  return format("with theta = %.4g a step of %.4g s multiplies free vibrations by exp(%.4g), more than damping takes: "
-                "theta = 1/2 needs no damping, theta below it a shorter step",
-                theta, h, growth);
+  return options.refuse && mode ? mode_refusal(*mode, theta, h) : std::string();
 }
 
 double fall_of_friction(const ThetaStep& step, const Interface& interface, const std::vector<double>& reactions)
 {
+  constexpr int passes = 30; // of power iteration
   const PairFriction friction = law_of_step(interface.friction, step.theta);
   if (steepest_fall(friction) == 0 || interface.pairs == 0) return 0;
-  std::vector<double> weights;
-  for (std::size_t i = 0; i < interface.gap.size(); ++i)
-    weights.push_back(steepest_fall(friction.of(i)) *
-                      std::max(0., PairView(reactions, interface.directions).normal(i)));
+  std::vector<double> roots(interface.size(), 0.);
+  const PairView<double> weights(roots, interface.directions);
+  for (std::size_t i = 0; i < weights.pairs(); ++i)
+    std::ranges::fill(
+        weights.tangential(i),
+        std::sqrt(steepest_fall(friction.of(i)) * std::max(0., PairView(reactions, interface.directions).normal(i))));
   double largest = 0;
-  const auto iterate = [&]
-  {
-    // power iteration on W_tt between the roots of |mu'| r_n
-    std::vector<double> x(interface.size(), 0.), y = x;
-    const PairView<double> start(x, interface.directions);
-    for (std::size_t i = 0; i < start.pairs(); ++i)
-      for (double& entry : start.tangential(i)) entry = 1 + 0.1 * std::sin(static_cast<double>(i));
-    for (int pass = 0; pass < 30; ++pass)
-    {
-      const double size = std::sqrt(dot(x, x));
-      if (size == 0) break;
-      for (double& entry : x) entry /= size;
-      largest = size;
-      scale_by_roots(weights, interface.directions, x);
-      const std::span<const double> in = x;
-      const std::span<double> out = y;
-      step.W.multiply(std::span(&in, 1), std::span(&out, 1));
-      scale_by_roots(weights, interface.directions, y);
-      std::swap(x, y);
-    }
-  };
   on_every_rank(comm_of(interface.B),
                 [&]
                 {
                   const ServedProducts served(step.W);
-                  if (rank_of(comm_of(interface.B)) == 0) iterate();
+                  if (rank_of(comm_of(interface.B)) == 0) largest = step.W.largest_eigenvalue(roots, passes);
                 });
   MPI_Bcast(&largest, 1, MPI_DOUBLE, 0, comm_of(interface.B));
   return largest;

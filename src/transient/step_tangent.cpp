@@ -1,7 +1,6 @@
 /// A column is a motion without load and drive whose contact is linear: with M dv, A dv and K du at hand a step solves
 ///     A dv_f = [M dv - (1-theta) A dv]/theta - h K du + force dh,      A dv+ = A dv_f + h B' dr,
-/// and A dv+ is the right-hand side just solved for, as in the step itself. Where C = alpha M + beta K, K dv+ follows
-/// from A dv+ and M dv+, and K du from K dv: M, of a third of K's entries, is the only matrix to multiply with.
+/// and A dv+ is the right-hand side just solved for, as in the step itself.
 #include "squeal/transient/step_tangent.hpp"
 
 #include "linear_contact.hpp"
@@ -13,7 +12,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 namespace squeal
 {
@@ -27,31 +25,10 @@ using Eigen::VectorXd;
 
 constexpr std::size_t at_once = 64; // columns: their work vectors take ten times a column's memory
 
-/// Steps after which K du is multiplied anew. In n steps of differences the rounding of M dv is added up n^2 times.
-constexpr std::size_t fresh_after = 64;
-
-/// C of M and K, and M alone.
-struct ProportionalDamping
-{
-  Rayleigh rayleigh;
-  PairedMatrices mass;
-};
-
-/// Nothing where C is no such sum, or matrices are dense.
-std::optional<ProportionalDamping> proportional_damping(const Structure& structure)
-{
-  std::optional<PairedMatrices> mass = pair_matrices(structure.M, nullptr);
-  if (!mass) return std::nullopt;
-  const std::optional<Rayleigh> rayleigh = rayleigh_part(structure.M, structure.C, structure.K);
-  if (!rayleigh) return std::nullopt;
-  return ProportionalDamping{*rayleigh, std::move(*mass)};
-}
-
 /// The products of the columns at a step's start, and its work vectors.
 struct TangentWork
 {
-  std::vector<Owned<Vec>> Mv, Av, Ku, Kv, v_next, scratch;
-  std::size_t steps = 0; // made so far
+  std::vector<Owned<Vec>> Mv, Av, Ku, v_next, scratch;
 };
 
 std::vector<Vec> handles(const std::vector<Owned<Vec>>& vectors)
@@ -67,11 +44,12 @@ TangentWork begin_tangents(const ThetaStep& step, const Structure& structure, st
   {
     u.push_back(column.u);
     v.push_back(column.v);
-    for (auto* vectors : {&work.Mv, &work.Av, &work.Ku, &work.Kv, &work.v_next, &work.scratch})
+    for (auto* vectors : {&work.Mv, &work.Av, &work.Ku, &work.v_next, &work.scratch})
       vectors->push_back(zeros_like(structure.load));
   }
   const double theta_h = step.theta * step.h;
-  const std::vector<Vec> Mv = handles(work.Mv), Av = handles(work.Av), Ku = handles(work.Ku), Kv = handles(work.Kv);
+  const std::vector<Vec> Mv = handles(work.Mv), Av = handles(work.Av), Ku = handles(work.Ku),
+                         Kv = handles(work.scratch);
   multiply_mass_and_stiffness(step, structure, {v, u}, {Mv, Ku});
   product(structure.C, v, Av);
   product(structure.K, v, Kv);
@@ -142,14 +120,13 @@ struct RecordedStep
   const Interface& interface;
   const StepRecord& record;
   std::span<const double> W; // all entries, on rank 0
-  const std::optional<ProportionalDamping>& damping;
 };
 
 /// dr of every column, on every rank. `Bv_free`: B dv_f of each, on rank 0.
 MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> columns, MatrixXd db,
                    const std::vector<double>& Bv_free)
 {
-  const auto& [step, structure, interface, record, W, damping] = of;
+  const auto& [step, structure, interface, record, W] = of;
   MatrixXd dr = MatrixXd::Zero(db.rows(), db.cols());
   on_rank_zero_with_lent_cores(comm_of(interface.B), interface.size(),
                                [&]
@@ -169,7 +146,7 @@ MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> column
 /// dv+ of every column from A dv_f in Av, with the contact that `db` starts from; Av becomes A dv+.
 void solve_columns(const RecordedStep& of, std::span<const TangentColumn> columns, MatrixXd db, TangentWork& work)
 {
-  const auto& [step, structure, interface, record, W, damping] = of;
+  const auto& [step, structure, interface, record, W] = of;
   const std::vector<Vec> Av = handles(work.Av);
   MatrixXd dr = MatrixXd::Zero(0, 0);
   const std::vector<double> Bv_free = step.factor.forward(Av);
@@ -188,38 +165,9 @@ void solve_columns(const RecordedStep& of, std::span<const TangentColumn> column
   step.factor.backward(lambda, handles(work.v_next));
 }
 
-/// M dv+ and K du+ of the columns, which have moved on; A dv+ is in Av.
-void multiply_columns(const RecordedStep& of, std::span<const TangentColumn> columns, TangentWork& work)
-{
-  const auto& [step, structure, interface, record, W, damping] = of;
-  const double h = step.h, theta = step.theta;
-  const std::vector<Vec> v = handles(work.v_next), Mv = handles(work.Mv), Ku = handles(work.Ku);
-  const bool fresh = !damping || (work.steps > 0 && work.steps % fresh_after == 0);
-  ++work.steps;
-  if (fresh)
-  {
-    std::vector<Vec> u;
-    for (const TangentColumn& column : columns) u.push_back(column.u);
-    multiply_mass_and_stiffness(step, structure, {v, u}, {Mv, Ku});
-  }
-  else
-    multiply_first(damping->mass, v, Mv);
-  if (!damping) return;
-  const double mass_part = 1 + h * theta * damping->rayleigh.of_mass,
-               stiffness_part = h * theta * (damping->rayleigh.of_stiffness + h * theta);
-  for (std::size_t k = 0; k < columns.size(); ++k)
-  {
-    const Vec Kv = work.Kv[k];
-    if (!fresh) check(VecAXPY(Ku[k], h * (1 - theta), Kv));
-    check(VecAXPBYPCZ(Kv, 1 / stiffness_part, -mass_part / stiffness_part, 0, work.Av[k], Mv[k]));
-    if (!fresh) check(VecAXPY(Ku[k], h * theta, Kv));
-    if (!fresh && columns[k].step_size != 0) check(MatMult(structure.K, columns[k].u, Ku[k])); // u moved by more
-  }
-}
-
 void one_step(const RecordedStep& of, std::span<TangentColumn> columns, TangentWork& work)
 {
-  const auto& [step, structure, interface, record, W, damping] = of;
+  const auto& [step, structure, interface, record, W] = of;
   const double h = step.h, theta = step.theta;
   const std::vector<Vec> Av = handles(work.Av), v_next = handles(work.v_next);
   MatrixXd db;
@@ -244,7 +192,9 @@ void one_step(const RecordedStep& of, std::span<TangentColumn> columns, TangentW
     if (column.step_size != 0) check(VecAXPY(column.u, column.step_size, record.v_theta));
     check(VecCopy(v_next[k], column.v));
   }
-  multiply_columns(of, columns, work);
+  std::vector<Vec> u;
+  for (const TangentColumn& column : columns) u.push_back(column.u);
+  multiply_mass_and_stiffness(step, structure, {v_next, u}, {handles(work.Mv), handles(work.Ku)});
 }
 
 } // namespace
@@ -273,14 +223,13 @@ void advance_tangents(const ThetaStep& step, const Structure& structure, const I
   else
     formed = whole_operator(step, interface);
   const std::span<const double> W = step.W.is_stored() ? step.W.entries() : formed;
-  const std::optional<ProportionalDamping> damping = proportional_damping(structure);
   for (std::size_t first = 0; first < columns.size(); first += at_once)
   {
     const auto batch = columns.subspan(first, std::min(at_once, columns.size() - first));
     TangentWork work = begin_tangents(step, structure, batch);
     for (const StepRecord& record : records)
     {
-      one_step({step, structure, interface, record, W, damping}, batch, work);
+      one_step({step, structure, interface, record, W}, batch, work);
       end_if_asked(comm_of(structure.load));
     }
   }

@@ -298,7 +298,7 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
   const auto& [structure, interface, equilibrium] = sliding;
   Trajectory trajectory;
   const long steps = plan(trajectory, mode, settings);
-  trajectory.outcome.reason = step_refusal(structure, mode, trajectory.theta, trajectory.step_size, options);
+  trajectory.outcome.reason = step_refusal(mode, trajectory.theta, trajectory.step_size, options);
   if (trajectory.outcome.reason.empty())
     trajectory.outcome.reason = friction_refusal(sliding, mode, trajectory.theta, trajectory.step_size, options,
                                                  largest_friction(settings.ramps));

@@ -87,13 +87,15 @@ def cores(count):
 class Run:
     """One finished run: exit code, what it printed, and report.json when there is one."""
 
+    length = ["--verbose"]  # of the table
+
     def __init__(self, arguments, ranks, folder):
         # one process needs no launcher, whose start takes as long as all that squeal does in a small run
         launcher = [os.environ.get("MPIEXEC", "mpirun"), "-n", str(ranks)] if ranks > 1 else []
         command = [*launcher, os.environ["SQUEAL"]]
         self.output = Path(folder)
         # The caller's arguments come last, so that its own --output wins.
-        command += ["--output", str(folder), *map(str, arguments)]
+        command += ["--output", str(folder), *self.length, *map(str, arguments)]
         with cores(ranks):
             done = subprocess.run(command, capture_output=True, text=True, timeout=500, env={**os.environ, **NO_WAIT})
         self.code, self.printed, self.errors = done.returncode, done.stdout, done.stderr

@@ -178,6 +178,14 @@ def test_cards_of_bulk_data(tmp_path, card, table, expected):
         assert scene[table] == expected and left_out == []
 
 
+def test_nodes_and_weights_of_mean_couplings(tmp_path):
+    """RBE3 of two weights: the nodes of each are a group."""
+    scene, left_out = converted(tmp_path, GRIDS + "RBE3,7,,100,123,1.,123,13,14\n,2.,123,15,16\n", "deck.bdf")
+    assert scene["coupling"] == [{"name": "rbe3_7_node", "on": ["rbe3_7", "rbe3_7_2"], "at": [0.5, 0.5, 3], "weights": [1, 2]}]
+    model = TOOL.read_deck(tmp_path / "deck.bdf")
+    assert model.node_sets == {"rbe3_7": [13, 14], "rbe3_7_2": [15, 16]} and len(left_out) == 1
+
+
 def test_names_surfaces_and_contacts_of_optistruct(tmp_path, squeal):
     """Small fields, continuations, names in comments, SURF by corners of faces, CONTACT by PCONT, and the selected load."""
     def row(*fields):
@@ -211,3 +219,259 @@ def test_named_faces_of_quadratic_solids(tmp_path, deck):
     model = TOOL.read_deck(tmp_path / f"deck.{deck}")
     assert model.surfaces["foot" if deck == "inp" else "property_9"] == [(1, 3, 2, 7, 6, 5)]
     assert len(model.parts) == 1 and model.notes == []
+
+
+def cdb(elements, more="", at=AT):
+    """A deck as CDWRITE has it: bricks of SOLID185 with material 1, and other elements."""
+    nodes = "".join(f"{i:9d}{0:9d}{0:9d}{x:21.13E}{y:21.13E}{z:21.13E}\n" for i, (x, y, z) in enumerate(at, 1))
+    rows = "".join("".join(f"{v:9d}" for v in [material, kind, real, 1, 0, 0, 0, 0, len(of), 0, label, *of][:19])
+                   + ("\n" + "".join(f"{v:9d}" for v in of[8:]) if len(of) > 8 else "") + "\n" for label, material, kind, real, of in elements)
+    return (f"/COM,ANSYS RELEASE 19.2\n/PREP7\nET,1,185\nET,2,170\nET,3,174\nET,4,186\nNBLOCK,6,SOLID,{len(at)},{len(at)}\n(3i9,6e21.13e3)\n"
+            f"{nodes}N,R5.3,LOC,       -1,\nEBLOCK,19,SOLID,{len(elements)},{len(elements)}\n(19i9)\n{rows}       -1\n"
+            "MPDATA,R5.0, 1,EX  ,     1, 1, 2.00000000E+11    ,\nMPDATA,R5.0, 1,NUXY,     1, 1, 0.250000000    ,\n"
+            f"MPDATA,R5.0, 1,DENS,     1, 1, 7800.00000    ,\n{more}/GO\nFINISH\n")
+
+
+BRICK_ROWS = [(1, 1, 1, 1, [*range(1, 9)]), (2, 1, 1, 1, [*range(9, 17)])]
+
+
+def test_commands_of_ansys(tmp_path, squeal):
+    """Components with a range, supports, a force, an acceleration, and a contact pair whose material has the friction."""
+    rows = [*BRICK_ROWS, (3, 3, 2, 7, [5, 6, 7, 8]), (4, 3, 3, 7, [9, 12, 11, 10])]
+    more = ("CMBLOCK,BASE,NODE,       2  ! users node component\n(8i10)\n         1        -4\nCMBLOCK,LOW,ELEM,       1\n(8i10)\n         1\n"
+            "MPDATA,R5.0, 1,MU  ,     3, 1, 0.400000000    ,\nF,13,FZ,-8.,0.\nACEL,0.,0.,9.81\nCE,R5.0,DEFI,2,1,0.\n"
+            + "".join(f"D,{n},{label},0.,0.\n" for n in range(1, 5) for label in ("UX", "UY", "UZ")))
+    scene, left_out = converted(tmp_path, cdb(rows, more), "deck.cdb")
+    assert left_out == ["the commands CE (1)"]
+    assert [part["name"] for part in scene["part"]] == ["material_1"] and scene["part"][0]["young"] == 2e11
+    assert scene["support"] == [{"on": "BASE", "fixed": "x y z"}] and scene["gravity"] == [0, 0, -9.81]
+    assert scene["force"] == [{"on": "node_13", "vector": [0, 0, -8]}]
+    assert scene["contact"] == [{"rotor": "target_7", "stator": "contact_7", "friction": 0.4}]
+    assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
+
+
+def test_degenerate_bricks_of_ansys(tmp_path):
+    """Bricks that repeat corners are wedges and tetrahedra."""
+    rows = [(1, 1, 1, 1, [1, 2, 3, 3, 5, 6, 7, 7]), (2, 1, 1, 1, [9, 10, 11, 11, 13, 13, 13, 13])]
+    (tmp_path / "deck.cdb").write_text(cdb(rows))
+    model = TOOL.read_deck(tmp_path / "deck.cdb")
+    assert list(model.elements.values()) == [("wedge6", (1, 2, 3, 5, 6, 7)), ("tet4", (9, 10, 11, 13))]
+
+
+@pytest.mark.parametrize("name", ["deck.txt", "deck.bdf", "deck"])
+def test_the_reader_is_chosen_by_what_a_file_holds(tmp_path, name):
+    for text in (BRICKS, GRIDS, cdb(BRICK_ROWS)):
+        (tmp_path / name).write_text(text)
+        assert len(TOOL.read_deck(tmp_path / name).elements) == 2
+
+
+def test_one_brake_in_three_formats(module_run, tmp_path):
+    """The same mesh, material, coupling, spring, mass, friction and force: the same eigenvalues."""
+    inp = BRICKS + ("*COUPLING, CONSTRAINT NAME=c, REF NODE=100, SURFACE=high_top\n*KINEMATIC\n*ELEMENT, TYPE=MASS, ELSET=lump\n50, 100\n"
+                    "*MASS, ELSET=lump\n64\n*ELEMENT, TYPE=SPRING1, ELSET=s\n51, 100\n*SPRING, ELSET=s\n3\n1048576.\n*BOUNDARY\n100, 1, 2\n100, 4, 6\n"
+                    "*SURFACE INTERACTION, NAME=rub\n*FRICTION\n0.5\n*CONTACT PAIR, INTERACTION=rub\nhigh_bottom, low_top\n*CLOAD\n100, 3, -4096.\n")
+    bdf = GRIDS + ("RBE2,7,100,123456,13,14,15,16\nCONM2,8,100,,64.\nCELAS2,9,1048576.,100,3\nSPC1,1,12456,100\nFORCE,2,100,,4096.,0.,0.,-1.\n"
+                   "SURF,11,ELFACE,,,,,,\n,1,5,7\nSURF,12,ELFACE,,,,,,\n,2,9,11\nCONTACT,1,0.5,12,11\n")
+    found = []
+    for text, name in ((inp, "deck.inp"), (bdf, "deck.bdf")):
+        folder = tmp_path / name
+        folder.mkdir()
+        scene, left_out = converted(folder, text, name)
+        assert left_out == [] and scene["contact"][0]["friction"] == 0.5
+        found.append(eigenvalues(module_run(slid(folder / "out" / "scene.toml"), ranks=1)))
+    folder = tmp_path / "deck.cdb"
+    folder.mkdir()
+    more = "MPDATA,R5.0, 1,MU  ,     3, 1, 0.5    ,\n" + "".join(f"D,{n},{label},0.,0.\n" for n in range(1, 5) for label in ("UX", "UY", "UZ"))
+    more += "CMBLOCK,LID,NODE,       4\n(8i10)\n        13        14        15        16\n"
+    converted(folder, cdb([*BRICK_ROWS, (3, 3, 2, 7, [5, 6, 7, 8]), (4, 3, 3, 7, [9, 12, 11, 10])], more), "deck.cdb")
+    body = ('[[rigid_body]]\nname = "c"\nsurfaces = "LID"\nat = [0.5, 0.5, 3]\nmass = 64\nfree = "z"\n[[spring]]\nfrom = "c"\ndirection = "z"\n'
+            'stiffness = 1048576\n[[force]]\non = "c"\nvector = [0, 0, -4096]\n')
+    scene = folder / "out" / "scene.toml"
+    scene.write_text(scene.read_text() + body)
+    found.append(eigenvalues(module_run(slid(scene), ranks=1)))
+    assert len(found[0]) > 3
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], rtol=1e-10)
+
+
+UNV = """    -1
+  2411
+         1         1         1        11
+   0.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00
+         2         1         1        11
+   1.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00
+         3         1         1        11
+   0.0000000000000000D+00   1.0000000000000000D+00   0.0000000000000000D+00
+         4         1         1        11
+   0.0000000000000000D+00   0.0000000000000000D+00   1.0000000000000000D+00
+    -1
+    -1
+  2412
+         1        11         2         1         7         2
+         0         1         1
+         1         2
+         2        41         2         1         7         3
+         1         3         2
+         3       111         2         1         7         4
+         1         2         3         4
+    -1
+    -1
+  2467
+         1         0         0         0         0         0         0         1
+foot
+         8         2         0         0
+         2         0         0         0         0         0         0         2
+tips
+         7         3         0         0         7         4         0         0
+         3         0         0         0         0         0         0         1
+wedge
+         8         3         0         0
+    -1
+"""
+
+
+def test_universal_files_keep_groups(tmp_path):
+    """Groups of nodes, faces and solids by Salome's dataset; lines are left out."""
+    (tmp_path / "deck.unv").write_text(UNV)
+    model = TOOL.read_deck(tmp_path / "deck.unv")
+    assert model.elements[3] == ("tet4", (1, 2, 3, 4)) and list(model.parts) == ["wedge"]
+    assert model.surfaces == {"foot": [(1, 3, 2)]} and model.node_sets == {"tips": [3, 4]}
+    assert model.notes == ["1 lines"]
+
+
+@pytest.mark.parametrize("old, new, words", [
+    ("       111         2         1         7         4", "       112         2         1         7         6", ["line 21", "nodes of element 3", "expected 6"]),
+    ("wedge\n         8         3         0         0\n", "wedge\n", ["line 31", "0 entities of wedge"]),
+    ("       111 ", "       113 ", ["line 21", "wedges of 15 nodes"]),
+    ("1.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00\n         3", "x 0 0\n         3", ["line 6", "'x'"]),
+])
+def test_bad_universal_files_are_refused(tmp_path, old, new, words):
+    assert old in UNV
+    (tmp_path / "deck.unv").write_text(UNV.replace(old, new, 1))
+    with pytest.raises(TOOL.Problem) as refused:
+        TOOL.read_deck(tmp_path / "deck.unv")
+    assert all(word in str(refused.value) for word in words), refused.value
+
+
+def slid(scene):
+    """The scene with its contact driven, and its modes alone."""
+    text = scene.read_text().replace("friction = 0.5", "friction = 0.5\nvelocity = [1, 0, 0]")
+    scene.write_text(text + '\n[modes]\nmethod = "full"\nband = 2000\n\n[estimate]\nenabled = false\n')
+    return scene
+
+
+def eigenvalues(report):
+    found = [complex(m["growth_rate"], 2 * np.pi * m["frequency_hz"]) for m in report["modes"]["modes"]]
+    return np.array(sorted(found, key=lambda value: value.imag))
+
+
+ROUND = """title = "round"
+gravity = [0, 0, -9.8125]
+[mesh]
+file = "deck.msh"
+[[part]]
+name = "low"
+young = 2e11
+poisson = 0.25
+density = 7800
+beta = 1e-7
+[[part]]
+name = "high"
+orthotropic = { young = [8e9, 4e9, 2e9], poisson = [0.125, 0.25, 0.25], shear = [2e9, 1e9, 1e9], axis_1 = [0, 1, 0], axis_2 = [1, 0, 0] }
+density = 2500
+[[support]]
+on = "base"
+fixed = "x y z"
+[[rigid_body]]
+name = "grip"
+surfaces = "high_top"
+at = [0.5, 0.5, 3]
+mass = 64
+inertia = [8, 8, 4, 0, 0, 0]
+free = "x y z"
+[[point]]
+name = "anchor"
+at = [0.5, 0.5, 5]
+free = "none"
+[[spring]]
+from = "grip"
+to = "anchor"
+direction = "x"
+stiffness = 1e6
+damping = 64
+[[spring]]
+from = "grip"
+direction = "y"
+stiffness = 2e6
+[[coupling]]
+name = "mean"
+on = "low_top"
+at = [0.5, 0.5, 1]
+mass = 2
+[[beam]]
+name = "rod"
+from = "grip"
+to = "mean"
+young = 2e11
+poisson = 0.25
+density = 7800
+diameter = 0.125
+elements = 2
+[[mass]]
+on = "corner"
+mass = 3
+[[force]]
+on = "grip"
+vector = [0, 0, -65536]
+[[pressure]]
+on = "high_top"
+value = 1e4
+[[bolt]]
+name = "tight"
+beam = "rod"
+tension = 1024
+[[contact]]
+rotor = "low_top"
+stator = "high_bottom"
+velocity = [0.5, 0.25, 0]
+friction = 0.375
+static_coefficient = 0.5
+decay_speed = 0.5
+compliance = 1e-12
+[[step]]
+name = "tighten"
+forces = [0.25]
+pressures = [0]
+friction = 0
+bolts = "tight"
+[[step]]
+name = "turn"
+[modes]
+method = "full"
+band = 2000
+[estimate]
+enabled = false
+"""
+
+
+def test_a_scene_goes_to_a_deck_and_back(module_run, tmp_path):
+    """Contacts, a bolt along a beam, couplings, springs, steps and friction: what comes back runs as it is, with the same modes."""
+    converted(tmp_path, BRICKS + "*NSET, NSET=corner\n13\n")
+    scene = tmp_path / "out" / "scene.toml"
+    scene.write_text(ROUND)
+    before = eigenvalues(module_run(scene, ranks=1))
+    old = sys.argv
+    sys.argv = ["mesh", str(scene), str(tmp_path / "back.inp"), "--to", "inp"]
+    try:
+        TOOL.main()
+    finally:
+        sys.argv = old
+    (tmp_path / "second").mkdir()
+    returned, left_out = converted(tmp_path / "second", (tmp_path / "back.inp").read_text())
+    assert left_out == [] and len(returned["contact"]) == len(returned["bolt"]) == 1 and len(returned["step"]) == 2
+    assert returned["step"][0]["friction"] == 0 and returned["contact"][0]["velocity"] == [0.5, 0.25, 0]
+    file = tmp_path / "second" / "out" / "scene.toml"
+    file.write_text(file.read_text().replace("[modes]", '[estimate]\nenabled = false\n\n[modes]\nmethod = "full"'))
+    after = eigenvalues(module_run(file, ranks=1))
+    assert len(before) > 3
+    np.testing.assert_allclose(after, before, rtol=1e-9)

@@ -115,3 +115,44 @@ def test_nothing_is_said_of_a_mode_that_is_not_followed(converged, tmp_path):
     run = converged(scene, ranks=1)
     shown = run.printed[run.printed.index("  transient    completed"):]
     assert "nan" not in run.printed and "predicted" not in shown and "periods" not in shown and "bias" not in shown
+
+
+def test_a_chain_with_uneven_dashpots_has_all_its_modes(converged, tmp_path):
+    """Eight masses between walls; the first and the last mode are published to all digits given, the others are NumPy's."""
+    damping, count = [250.0, *[50.0] * 7, 25.0], 8
+    names = ["ground", *(f"P{i}" for i in range(1, count + 1)), "ground"]
+    springs = [{"from": a, "to": b, "direction": "x", "stiffness": 1e5, "damping": c}
+               for a, b, c in [(names[1], "ground", damping[0]), *zip(names[1:], names[2:], damping[1:])]]
+    scene = write_scene(tmp_path, point=[{"name": name, "at": [float(i), 0, 0], "mass": 10.0, "free": "x"}
+                                         for i, name in enumerate(names[1:-1])], spring=springs, modes={"band": 40.0})
+    modes = converged(scene, ranks=1).report["modes"]["modes"]
+    incidence = np.eye(count + 1, count) - np.eye(count + 1, count, -1)
+    K, C = (incidence.T @ np.diag(values) @ incidence for values in (np.full(count + 1, 1e5), damping))
+    zero, one = np.zeros((count, count)), np.eye(count)
+    exact = np.linalg.eigvals(np.block([[zero, one], [-K / 10, -C / 10]]))
+    exact = sorted(exact[exact.imag > 0], key=lambda value: value.imag)
+    assert [mode["frequency_hz"] for mode in modes] == pytest.approx([value.imag / (2 * np.pi) for value in exact], rel=1e-10)
+    assert [mode["growth_rate"] for mode in modes] == pytest.approx([value.real for value in exact], rel=1e-9)
+    assert (modes[0]["frequency_hz"], modes[-1]["frequency_hz"]) == pytest.approx((5.5291472398, 31.2948323744), rel=1e-10)
+    assert (modes[0]["damping_ratio"], modes[-1]["damping_ratio"]) == pytest.approx((0.015208962, 0.050296429), rel=1e-7)
+
+
+def test_a_pad_and_a_disc_under_falling_friction(converged, tmp_path):
+    """Eigenvalues and derivatives by dense algebra, to the digits given."""
+    at = [0, 0, 0]
+    scene = write_scene(
+        tmp_path, point=[{"name": "pad", "at": at, "mass": 1.0, "free": "x y"}, {"name": "disc", "at": at, "mass": 1.5, "free": "x"}],
+        spring=[{"from": "pad", "direction": "x", "stiffness": 100.0, "damping": 0.3},
+                {"from": "disc", "direction": "x", "stiffness": 150.0, "damping": 0.1}],
+        force=[{"on": "pad", "vector": [0, -10, 0]}],
+        contact=[{"rotor": "disc", "stator": "pad", "normal": [0, 1, 0], "tangents": [[1, 0, 0]], "velocity": [2, 0, 0]}],
+        friction={"coefficient": 0.3, "static_coefficient": 0.6, "decay_speed": 3.0}, modes={"band": 10.0}, sensitivity={},
+        probe=[{"name": "pad", "on": "pad", "direction": "x"}], change=[{"probe": "pad", "damping": 0.2}])
+    report = converged(scene, ranks=1).report
+    first, second = report["modes"]["modes"]
+    assert (first["growth_rate"], first["frequency_hz"]) == pytest.approx((0.3324347, 1.5906698), rel=1e-7)
+    assert second["growth_rate"] == pytest.approx(-0.0879204, rel=1e-6)
+    mode, = report["sensitivity"]["modes"]
+    assert mode["changes"][0]["computed"]["growth_rate"] == pytest.approx(0.2918692, rel=1e-6)
+    by = {one["key"]: one["growth_rate_by_percent"] for one in mode["derivatives"]}
+    assert (by["spring.0.damping"], by["spring.1.damping"]) == pytest.approx((-0.00069452, -0.00017900), rel=1e-4)

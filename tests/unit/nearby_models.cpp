@@ -54,7 +54,7 @@ double difference(Mat A, Mat B)
 /// The model is that of the scene with these numbers, built from nothing.
 void check_model(const BrakeModel& model, const Scene& scene, const std::vector<SceneNumber>& numbers)
 {
-  const Scene other = scene_with(scene, numbers);
+  Scene other = scene_with(scene, numbers);
   const Model built = build_model(other, PETSC_COMM_WORLD);
   for (const auto matrix : {&Structure::M, &Structure::C, &Structure::K})
     CHECK(difference(model.structure.*matrix, built.structure.*matrix) == 0);
@@ -79,7 +79,7 @@ struct Kind
 
 TEST_CASE("a number makes anew the parts that it enters alone, whatever number was changed before")
 {
-  const Scene scene = two_points();
+  Scene scene = two_points();
   const Model model = build_model(scene, PETSC_COMM_WORLD);
   NearbyModels models(model, scene, comm_of(model.structure.load));
   const BrakeModel own = models.at({});
@@ -112,7 +112,7 @@ TEST_CASE("a number makes anew the parts that it enters alone, whatever number w
 
 TEST_CASE("on a grid of a stiffness and the friction coefficient the matrices are made once a stiffness")
 {
-  const Scene scene = two_points();
+  Scene scene = two_points();
   const Model model = build_model(scene, PETSC_COMM_WORLD);
   NearbyModels models(model, scene, PETSC_COMM_WORLD);
   const std::vector<std::string> keys = {"spring.0.stiffness", "friction.coefficient"};

@@ -3,6 +3,7 @@
 #include "../support/temporary_folder.hpp"
 #include "squeal/model.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <doctest/doctest.h>
@@ -266,11 +267,39 @@ TEST_CASE("the table never shows figures of a cycle that did not converge")
 {
   const Model model = one_of_each();
   Report report = full_report(model);
-  CHECK(table(report, scene_of_test()).find("mean energy") != std::string::npos);
+  CHECK(table(report, scene_of_test(), TableLength::full).find("mean energy") != std::string::npos);
   report.motion.cycle.outcome = {OutcomeKind::not_converged, "the residual stalled", 9, 0.1};
-  const std::string text = table(report, scene_of_test());
+  const std::string text = table(report, scene_of_test(), TableLength::full);
   CHECK(text.find("mean energy") == std::string::npos);
   CHECK(text.find("NOT CONVERGED: the residual stalled") != std::string::npos);
+}
+
+TEST_CASE(
+    "the short table: an answer, a row a stage, what failed, the next command; a known motion settles the estimate")
+{
+  const Model model = one_of_each();
+  Report report = full_report(model);
+  report.program = "squeal";
+  report.command = "squeal scene";
+  report.place = "results/scene";
+  report.model.warnings = {"first", "second"};
+  report.motion.cycle.multipliers.stability = Stability::stable;
+  const auto has = [](const std::string& text, const char* words) { return text.find(words) != std::string::npos; };
+  const std::string found = table(report, scene_of_test(), TableLength::brief);
+  CHECK(std::ranges::count(found, '\n') <= 20);
+  CHECK(found.starts_with("\none of each\n  heard        squeals at 100 Hz"));
+  CHECK(has(found, "\n  cycle        converged, frequency 100 Hz"));
+  CHECK(has(found, "\n    modes      frequency 100 Hz, growth rate 5 1/s"));
+  CHECK(has(found, "\n  WARNING: first\n  WARNING: second\n"));
+  CHECK(has(found, "\n  next         squeal report results/scene\n"));
+  CHECK_FALSE(has(found, "FAILED"));
+  report.motion.cycle.outcome = {OutcomeKind::not_converged, "the residual stalled", 9, 0.1};
+  report.transient.energy_defect_max = 0.5;
+  const std::string failed = table(report, scene_of_test(), TableLength::brief);
+  CHECK(has(failed, "NOT CONVERGED: the residual stalled"));
+  CHECK(has(failed, "FAILED: transient energy defect max 0.5"));
+  CHECK(has(failed, "next         squeal scene --set transient.periods=400"));
+  CHECK_FALSE(has(found, "no amplitude is predicted"));
 }
 
 TEST_CASE("a folder that cannot be written is an error on every rank, and nothing is left half-written")

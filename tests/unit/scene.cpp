@@ -3,6 +3,7 @@
 #include "../support/temporary_folder.hpp"
 #include "squeal/scene/numbers.hpp"
 
+#include <array>
 #include <cmath>
 #include <doctest/doctest.h>
 
@@ -424,4 +425,83 @@ TEST_CASE("a number is set through its member as a file would set it, and its ke
   CHECK(effect("point.tip.at.0") == Effect::mesh);
   scene.parts.emplace_back().rotation = Rotation{};
   CHECK(effect("part.disc.density") == Effect::stiffness_and_mass);
+}
+
+TEST_CASE("a named number stands wherever a key takes one, drives all of its places and is written by its name")
+{
+  const TemporaryFolder folder;
+  const auto read = [&](const std::string& text, const std::vector<std::string>& overrides)
+  { return read_scene(folder.write("scene.toml", text), overrides); };
+  const std::string text = "[numbers]\nclamp = 600\nspeed = 2\n" +
+                           replaced(points, "velocity = [1, 0, 0]", "velocity = [\"-speed\", 0, 0]") +
+                           "[[force]]\non = \"pad\"\nvector = [0, \"-clamp\", 0]\n[[spring]]\nfrom = \"disc\"\n"
+                           "direction = \"y\"\nstiffness = \"clamp\"\n";
+  const Scene scene = read(text, {});
+  CHECK(scene.forces[0].vector == Vec3{0, -600, 0});
+  CHECK(scene.springs[0].stiffness == 600);
+  CHECK(scene.contacts[0].velocity == Vec3{-2, 0, 0});
+  const Scene given = read(text, {"numbers.clamp=50"});
+  CHECK(given.forces[0].vector[1] == -50);
+  CHECK(given.springs[0].stiffness == 50);
+
+  const SceneNumber other{"numbers.clamp", 70};
+  const Scene changed = scene_with(scene, std::span(&other, 1));
+  CHECK(changed.forces[0].vector == Vec3{0, -70, 0});
+  CHECK(changed.springs[0].stiffness == 70);
+  const std::vector<SceneNumber> driven = driven_by(scene, std::span(&other, 1));
+  REQUIRE(driven.size() == 2);
+  CHECK((driven[0].key == "spring.0.stiffness" || driven[1].key == "spring.0.stiffness"));
+  CHECK(driven_by(scene, driven).size() == 2);
+  CHECK(description_of(scene, "numbers.speed").name == "contact.0.velocity.0");
+
+  const std::string resolved = resolved_scene(scene);
+  CHECK(resolved.find("\"-clamp\"") != std::string::npos);
+  CHECK(resolved.find("stiffness = \"clamp\"") != std::string::npos);
+  CHECK(resolved_scene(read(resolved, {})) == resolved);
+  CHECK(read(resolved, {"numbers.clamp=1"}).forces[0].vector[1] == -1);
+
+  check_message(error_of(text, {"spring.0.stiffness=clamps"}), {"stiffness", "clamps"});
+  check_message(error_of(text, {"numbers.clamp=-1"}), {"stiffness", "-1"});
+  check_message(error_of(text, {"sweep.key=numbers.clam", "sweep.from=1", "sweep.to=2"}),
+                {"numbers.clam", "numbers.clamp"});
+}
+
+TEST_CASE("a rotor moves the contacts of its part, and says what is wrong with it")
+{
+  const TemporaryFolder folder;
+  const std::string own = "velocity = [1, 0, 0]\n", belt = "[[rotor]]\npart = \"disc\"\nvelocity = [1, 0, 0]\n";
+  Scene scene = read_scene(folder.write("scene.toml", replaced(points, own, "") + belt), {});
+  CHECK(is_undriven(scene.contacts[0]));
+  drive_contacts(scene, std::array{0});
+  CHECK(scene.contacts[0].velocity == Vec3{1, 0, 0});
+  const SceneNumber faster{"rotor.0.velocity.0", 3};
+  CHECK(scene_with(scene, std::span(&faster, 1)).contacts[0].velocity == Vec3{3, 0, 0});
+  Scene both = read_scene(folder.write("both.toml", points + belt), {});
+  CHECK_THROWS_AS(drive_contacts(both, std::array{0}), Error);
+  CHECK_THROWS_AS(drive_contacts(scene, std::array{-1}), Error);
+  check_message(error_of(points + belt + belt, {}), {"[[rotor]]", "twice"});
+  check_message(error_of(points + belt, {"rotor.0.part=wheel"}), {"wheel", "not defined"});
+  check_message(error_of(points + belt, {"rotor.0.axis=z", "rotor.0.rate=2"}), {"rate and a velocity"});
+  check_message(error_of(points + "[[rotor]]\npart = \"disc\"\nrate = 3\n", {}), {"needs axis and rate"});
+}
+
+TEST_CASE("design points come from a file, whose head names numbers of the scene")
+{
+  const TemporaryFolder folder;
+  folder.write("points.csv", "# a remark\nfriction.coefficient, numbers.speed\n0.1,1\n\n0.2,-2\n");
+  folder.write("short.csv", "friction.coefficient,numbers.speed\n0.1\n");
+  folder.write("word.csv", "friction.coefficient\nmuch\n");
+  folder.write("other.csv", "friction.coefficients\n0.1\n");
+  const std::string text = "[numbers]\nspeed = 1\n" + replaced(points, "[1, 0, 0]", "[\"speed\", 0, 0]");
+  const auto read = [&](const std::string& file)
+  { return read_scene(folder.write("scene.toml", text), {"sweep.table=" + file}); };
+  const Scene scene = read("points.csv");
+  CHECK(scene.sweep->key == std::vector<std::string>{"friction.coefficient", "numbers.speed"});
+  CHECK(scene.sweep->design == std::vector<std::vector<double>>{{0.1, 1}, {0.2, -2}});
+  const std::string resolved = resolved_scene(scene);
+  CHECK(resolved_scene(read_scene(folder.write("resolved.toml", resolved), {})) == resolved);
+  CHECK_THROWS_AS(read("short.csv"), Error);
+  CHECK_THROWS_AS(read("word.csv"), Error);
+  CHECK_THROWS_AS(read("other.csv"), Error);
+  CHECK_THROWS_AS(read("none.csv"), Error);
 }

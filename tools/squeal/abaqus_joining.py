@@ -260,6 +260,7 @@ def pre_tension(block, deck):
     rows = list(block.rows())
     axis = [number(field or "0", rows[0][0]) for field in (rows[0][1] + ["0"] * 3)[:3]] if rows and any(rows[0][1]) else None
     deck.pretension[node] = (block, axis)
+    deck.model.joints.of_bolts.add(node)
 
 
 HANDLERS = {"COUPLING": coupling, "KINEMATIC": kinematic, "DISTRIBUTING": distributing, "KINEMATIC COUPLING": kinematic_coupling,

@@ -16,6 +16,7 @@ class Steps:
         self.tightened = []
         self.interactions, self.current = {}, None  # keys of [[contact]] by name
         self.pairs = []  # (slave, master, name of the interaction)
+        self.gaps = {}  # by slave and master
         self.drives = []  # (nodes, keys)
         self.bands = []
         self.in_step = False
@@ -115,18 +116,30 @@ def pairs(block, deck):
             deck.steps.pairs.append((*names, block.options.get("INTERACTION", "").upper()))
 
 
+def clearance(block, deck):
+    """An initial gap of the contact of two surfaces."""
+    names = tuple(block.options.get(key, "").upper() for key in ("SLAVE", "MASTER"))
+    if "VALUE" not in block.options or not all(names):
+        deck.note("*CLEARANCE without SLAVE, MASTER and VALUE", block.place)
+        return
+    deck.steps.gaps[names] = number(block.options["VALUE"], block.place)
+
+
 def motion(block, deck):
     turning = "ROTATION" in block.options
     if block.options.get("TYPE", "DISPLACEMENT").upper() not in ("VELOCITY", "DISPLACEMENT"):
         deck.note(f"*MOTION, TYPE={block.options['TYPE']}", block.place)
         return
+    velocities = {}  # by set, of which each line has a component
     for place, fields in block.rows(3, "a set of nodes, a rate and an axis, or a motion and a velocity"):
         nodes = deck.nodes_of(fields[0], place)
         if not turning:
             direction = whole(fields[1], place, "a motion from 1 to 3")
             if not 1 <= direction <= 3:
                 raise Problem(f"{place}: motion {direction}; expected 1 to 3")
-            keys = {"velocity": [number(fields[2], place) if i == direction - 1 else 0.0 for i in range(3)]}
+            velocity = velocities.setdefault(fields[0].upper(), [0.0] * 3)
+            velocity[direction - 1] = number(fields[2], place)
+            keys = {"velocity": velocity}
         else:
             values = [number(field or "0", place) for field in (fields[1:] + ["0"] * 6)[:7]]
             start, end = values[1:4], values[4:7]
@@ -237,8 +250,13 @@ def finish(deck):
         add_bolt(deck, node, block, axis)
     add_contacts(deck, ends)
     add_steps(deck, ends, order)
-    whole_bands = [upper for whole_problem, upper in steps.bands if whole_problem] or [upper for _, upper in steps.bands]
-    model.band = max(whole_bands, default=0.0)
+    complex_bands = [upper for is_complex, upper in steps.bands if is_complex] or [upper for _, upper in steps.bands]
+    model.band = max(complex_bands, default=0.0)
+
+
+def bolt_name(deck, node):
+    """By the set that has its node alone."""
+    return next((name for name, nodes in deck.model.node_sets.items() if nodes == [node]), f"bolt_{node}")
 
 
 def add_bolt(deck, node, block, axis):
@@ -246,7 +264,7 @@ def add_bolt(deck, node, block, axis):
     if node not in deck.tension:
         deck.note(f"*PRE-TENSION SECTION of node {node}, which no *CLOAD tightens", block.place)
         return
-    keys = {"name": f"bolt_{node}", "tension": deck.tension[node]}
+    keys = {"name": bolt_name(deck, node), "tension": deck.tension[node]}
     known = {name.upper(): name for name in model.surfaces}
     surface = known.get(options.get("SURFACE", "").upper())
     if options.get("ELEMENT", "").isdecimal() and int(options["ELEMENT"]) in deck.beams:
@@ -273,6 +291,7 @@ def add_contacts(deck, ends):
     nodes_of |= {name: set(nodes) for name, nodes in model.node_sets.items() if name not in nodes_of}
     for slave, master, name in deck.steps.pairs:
         keys = {"friction": 0.0, **deck.steps.interactions.get(name, {})}
+        keys |= {"gap": gap} if (gap := deck.steps.gaps.get((slave.upper(), master.upper()))) else {}
         for moving, drive in deck.steps.drives:
             if nodes_of[master] <= moving:
                 keys |= drive
@@ -302,7 +321,7 @@ def add_steps(deck, ends, order):
         shares = {laws[name].get("friction", 0.0) / last[2][name]["friction"] for name in driven if last[2].get(name, {}).get("friction") and name in laws}
         if len(shares) > 1:
             model.notes.append(f"frictions of contacts in {title} that change by different factors: they have the last step's")
-        found.append((title, factors, shares.pop() if len(shares) == 1 else 1.0, [f"bolt_{node}" for node in tightened]))
+        found.append((title, factors, shares.pop() if len(shares) == 1 else 1.0, [bolt_name(deck, node) for node in tightened]))
     plain = all(factor == 1 for _, factors, share, _ in found for factor in (*factors.values(), share))
     late = any(bolts for *_, bolts in found[1:])
     if len(found) > 1 and not (plain and not late):
@@ -311,7 +330,7 @@ def add_steps(deck, ends, order):
 
 HANDLERS = {"STEP": step, "END STEP": end_step, "FREQUENCY": frequency, "COMPLEX FREQUENCY": frequency,
             "SURFACE INTERACTION": interaction, "CHANGE FRICTION": change_friction, "FRICTION": friction,
-            "SURFACE BEHAVIOR": behaviour, "TIE": pairs, "CONTACT PAIR": pairs, "MOTION": motion, "CLOAD": concentrated,
+            "SURFACE BEHAVIOR": behaviour, "TIE": pairs, "CONTACT PAIR": pairs, "MOTION": motion, "CLEARANCE": clearance, "CLOAD": concentrated,
             "DSLOAD": surface_pressure, "DLOAD": element_load, **dict.fromkeys(STATIC, procedure)}
 OPTIONS = {"FREQUENCY": "EIGENSOLVER,NORMALIZATION,SOLVER,STORAGE,GLOBAL,CYCMPC,ACOUSTIC COUPLING",
            "COMPLEX FREQUENCY": "FRICTION DAMPING,CORIOLIS,FLUTTER,PROPERTY EVALUATION,LEFT EIGENVECTORS",
@@ -319,4 +338,4 @@ OPTIONS = {"FREQUENCY": "EIGENSOLVER,NORMALIZATION,SOLVER,STORAGE,GLOBAL,CYCMPC,
            "FRICTION": "SLIP TOLERANCE,EXPONENTIAL DECAY,ROUGH,LAGRANGE,ELASTIC SLIP",
            "SURFACE BEHAVIOR": "PRESSURE-OVERCLOSURE,AUGMENTED LAGRANGE,PENALTY,DIRECT", "TIE": "NAME,ADJUST,TYPE,CONSTRAINT RATIO,NO ROTATION",
            "CONTACT PAIR": "INTERACTION,TYPE,ADJUST,SMALL SLIDING,TIED,MECHANICAL CONSTRAINT,CPSET,TRACKING,SUPPLEMENTARY CONSTRAINTS",
-           "MOTION": "TRANSLATION,ROTATION,TYPE", "CLOAD": "OP", "DSLOAD": "OP", "DLOAD": "OP"}
+           "CLEARANCE": "SLAVE,MASTER,VALUE", "MOTION": "TRANSLATION,ROTATION,TYPE", "CLOAD": "OP", "DSLOAD": "OP", "DLOAD": "OP"}

@@ -18,6 +18,7 @@ class Joints:
         self.held, self.moved = {}, {}  # motions, and their displacements by motion, by node
         self.forces = {}  # six components by node
         self.names = {}  # that the deck gives to nodes
+        self.of_bolts = set()  # nodes that stand for a tension
 
     def call_group(self, name, shown, faces):
         """A group has another name; faces that a set of nodes covers do for rigid couplings alone."""
@@ -176,8 +177,12 @@ class Tables:
             self.note(f"the spring at node {a} ({where}): its ends are at the same place, which gives it no direction")
             return
         first, *rest = sorted(ends, key=lambda node: self.kinds[node] != "group")
-        self.add("spring", **{"from": self.names[first]}, **({"to": self.names[rest[0]]} if rest else {}),
-                 direction=direction, **keys)
+        line = {"from": self.names[first], **({"to": self.names[rest[0]]} if rest else {}), "direction": direction}
+        for table, known in self.tables:  # a spring and a dashpot side by side are one
+            if table == "spring" and line.items() <= known.items() and known.keys().isdisjoint(keys):
+                known.update(keys)
+                return
+        self.add("spring", **line, **keys)
 
     def make_connector(self, a, b, keys, where):
         ends = [node for node in (a, b) if node is not None]

@@ -6,6 +6,7 @@ from squeal.abaqus_deck import read_inp
 from squeal.ansys_deck import read_cdb
 from squeal.deck_files import Problem
 from squeal.nastran_deck import read_bdf
+from squeal.unv_deck import read_unv
 
 # what a line of the beginning looks like, and how many of its like are there at most before the reader is chosen
 SIGNS = {
@@ -15,7 +16,7 @@ SIGNS = {
     "unv": re.compile(r"^\s+-1\s*$"),
     "step": re.compile(r"^ISO-10303-21"),
 }
-READERS = {"abaqus": read_inp, "ansys": read_cdb, "nastran": read_bdf}
+READERS = {"abaqus": read_inp, "ansys": read_cdb, "nastran": read_bdf, "unv": read_unv}
 LINES = 5000  # of the beginning that are looked at
 ENDINGS = {".inp": "abaqus", ".bdf": "nastran", ".nas": "nastran", ".dat": "nastran", ".fem": "nastran", ".cdb": "ansys",
            ".unv": "unv", ".step": "step", ".stp": "step"}
@@ -41,8 +42,8 @@ def read_deck(file):
     kind = kind_of(file)
     if kind in READERS:
         return finished(READERS[kind](file), file)
-    if kind in ("unv", "step"):
-        raise Problem(f"{file}: expected a deck; squeal itself reads it as [mesh] file")
+    if kind == "step":
+        raise Problem(f"{file}: a geometry, of which a mesh is to be made: give --size, the size of its elements")
     from squeal import common
 
     common.needs("meshio")

@@ -139,7 +139,7 @@ class Model:
     def drop_loose_nodes(self):
         """Nodes of sets that no element has, such as reference nodes."""
         used = {node for _, nodes in self.elements.values() for node in nodes}
-        joined = set(self.joints.ends()) - used
+        joined = set(self.joints.ends()) - used | self.joints.of_bolts
         for name, nodes in list(self.node_sets.items()):
             kept = [node for node in dict.fromkeys(nodes) if node in used]
             lost = len(set(nodes) - joined) - len(kept)

@@ -39,7 +39,7 @@ def rigid_bar(card, deck):
 
 def mean(card, deck):
     """RBE3: groups of a weight, motions and nodes."""
-    fields, i, count = card.fields, 5, 0
+    fields, i, count = card.fields, 4, 0
     while i < len(fields) and not fields[i] in ("UM", "ALPHA"):
         if not fields[i]:
             i += 1

@@ -29,14 +29,11 @@ struct PairedMatrices
   Owned<PetscSF> exchange;  // of their rows
 };
 
-/// Nothing unless M and K are sparse. K may be null: then M's entries that are not zero. Collective.
+/// Nothing unless M and K are sparse. Collective.
 std::optional<PairedMatrices> pair_matrices(Mat M, Mat K);
 
 /// Mv = M v and Ku = K u of each. Collective.
 void multiply_both(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> u,
                    std::span<const Vec> Mv, std::span<const Vec> Ku);
-
-/// Mv = M v of each, by matrices that were made without K. Collective.
-void multiply_first(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> Mv);
 
 } // namespace squeal

@@ -123,8 +123,8 @@ public:
   /// All entries by rows, on rank 0, of a stored W that is not shared, or after hold_whole.
   std::span<const double> entries() const { return values_; }
 
-  /// By power iteration: a lower bound.
-  double largest_eigenvalue(int iterations) const;
+  /// The largest eigenvalue of R W R, R the diagonal matrix of these roots, by power iteration: a lower bound.
+  double largest_eigenvalue(std::span<const double> roots, int iterations) const;
 
 private:
   friend class ServedProducts;

@@ -36,6 +36,9 @@ struct BrakeModel
   Interface interface;
 };
 
+/// Velocity of the rotor's surface, by its rotation or as given [m/s]; zero on the axis itself, round-off aside.
+Vec3 drive_velocity(const Contact& contact, const Vec3& at);
+
 /// Rows n, t1, t2 of every pair: n.w and t.w, with w the weighted sum of its nodes' displacements. Tangents: the
 /// scene's, else t1 along the drive. Pairs are whole on every rank, T on rank 0. Collective.
 Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& scene, const DofMap& dofs, MPI_Comm comm);

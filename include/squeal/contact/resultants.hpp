@@ -9,6 +9,7 @@ namespace squeal
 struct ContactResultant
 {
   double normal_force = 0; // [N] sum of r_n
+  double closed_share = 0; // [-] of its pairs, those with a normal reaction
   double torque = 0;       // [N m] with which it brakes its rotation: sum of r_t.v_d over the rate; 0 without rotation
 };
 

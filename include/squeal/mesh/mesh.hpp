@@ -93,6 +93,12 @@ std::vector<int> named_nodes(const Mesh& mesh, const std::string& name, const st
 /// Returns the faces of a surface.
 const std::vector<Face>& named_faces(const Mesh& mesh, const std::string& name, const std::string& user);
 
+/// The part of a named surface, by its first face, or the point of that name. Empty: it bounds no part.
+std::string part_of(const Scene& scene, const Mesh& mesh, const std::string& surface);
+
+/// For every contact the place of the scene's rotor that drives it; -1: none. Throws Error where a rotor is the stator.
+std::vector<int> rotors_of_contacts(const Scene& scene, const Mesh& mesh);
+
 /// Returns "node 12 at (x, y, z)" for messages.
 std::string node_text(int node, const Vec3& position);
 

@@ -22,14 +22,23 @@
 namespace squeal
 {
 
+/// A part of the scene with what it weighs.
+struct PartMass
+{
+  std::string name;
+  double mass = 0; // [kg] of its elements
+};
+
 /// The size of the model.
 struct ModelSummary
 {
   PetscInt dofs = 0;
   long elements = 0;
   int pairs = 0, ranks = 1;
-  double memory_bytes = 0;           // largest resident size so far, all ranks together
-  double length = 0;                 // [m] of the longest side of the box around the mesh; 0 on a matrix scene
+  double memory_bytes = 0; // largest resident size so far, all ranks together
+  double length = 0;       // [m] of the longest side of the box around the mesh; 0 on a matrix scene
+  Vec3 size{};             // [m] of that box
+  std::vector<PartMass> parts;
   double rounding_hz = 0;            // 1e-6 sqrt(|K|/|M|) / 2 pi: slower modes are lost in rounding
   std::vector<std::string> warnings; // of values that are hardly meant
   std::vector<Coverage> coverage;    // one a contact; empty on a matrix scene
@@ -67,12 +76,16 @@ struct BoltResult
 /// scene) or "skipped", with the reason.
 struct Report
 {
-  std::string run;      // the identity that every file of the run carries
-  std::string ended_by; // "by SIGTERM" where the run was asked to end; empty: it was not
-  int exit_code = -1;   // -1: the run goes on
+  std::string run;             // the identity that every file of the run carries
+  std::string program;         // as the shell called it; its word `report` is a tool
+  std::string command;         // by which it was called, as a shell takes it
+  std::filesystem::path place; // of its results
+  std::string ended_by;        // "by SIGTERM" where the run was asked to end; empty: it was not
+  int exit_code = -1;          // -1: the run goes on
   ModelSummary model;
   SlidingPoint point;
   std::vector<ContactResultant> contacts; // of the equilibrium, one a contact of the scene; empty on a matrix scene
+  double displacement = 0;                // [m] largest one of the equilibrium
   std::vector<double> equilibrium_probes; // [m] at the equilibrium, one a probe
   std::vector<BoltResult> bolts;          // at the equilibrium
   Response response;
@@ -93,12 +106,22 @@ const Estimate& followed_estimate(const Report& report);
 /// The outcome of every stage but the model, in the order in which they run.
 std::array<std::pair<Stage, Outcome>, 13> outcomes_of(const Report& report);
 
-/// One sentence that says what is heard, and whether it lasts: the last row of the table. Of rank 0, as the three
+/// One sentence that says what is heard, and whether it lasts: the first row of the table. Of rank 0, as the four
 /// below.
 std::string heard(const Report& report, const Scene& scene);
 
+/// A command that a shell takes, and that goes on from the results of this run.
+std::string next_command(const Report& report, const Scene& scene);
+
+/// The length of the printed table.
+enum class TableLength
+{
+  brief, // a line for each stage
+  full,  // before them a row for each result that a person reads
+};
+
 /// The table a person reads, line by line.
-std::string table(const Report& report, const Scene& scene);
+std::string table(const Report& report, const Scene& scene, TableLength length);
 
 /// The whole report as JSON: SI units, null for what is not a number.
 std::string report_json(const Report& report, const Scene& scene);
@@ -107,7 +130,7 @@ std::string report_json(const Report& report, const Scene& scene);
 std::string result_page();
 
 /// Rank 0 prints the table.
-void print_table(const Report& report, const Scene& scene, MPI_Comm comm);
+void print_table(const Report& report, const Scene& scene, TableLength length, MPI_Comm comm);
 
 /// Collective. Writes what was asked for into `output`: the scene with every default, and the options.
 void write_request(const Scene& scene, const std::string& run, const std::filesystem::path& output, MPI_Comm comm);

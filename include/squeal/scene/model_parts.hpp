@@ -295,6 +295,7 @@ struct Contact
   double slip_compliance = 0;       // [m3/N] elastic slip over shear stress, in series with friction without a drive
   std::optional<FrictionLaw> friction{}; // if absent, the scene's
   std::filesystem::path gap_file{};      // of gaps by the places of slave nodes, that add to `gap`; empty: none
+  int driven_by = -1;                    // place in the scene's rotors; -1: none, or not known before the mesh
 };
 
 /// Whether nothing drives the rotor of a contact: its pairs stick or slip by what acts on them alone.
@@ -302,6 +303,14 @@ inline bool is_undriven(const Contact& contact)
 {
   return !contact.rotation && contact.velocity == Vec3{};
 }
+
+/// A part that moves past others. Contacts whose rotor is a surface of it, or a point of its name, have its drive.
+struct Rotor
+{
+  std::string part;    // or a point
+  Rotation rotation{}; // the axis is zero where there is none
+  Vec3 velocity{};     // [m/s] of its surface instead
+};
 
 /// Two surfaces of parts meshed apart that move as one; nodes of the slave follow the master.
 struct Tie

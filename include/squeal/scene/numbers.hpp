@@ -17,6 +17,12 @@ struct SceneNumber
 /// Numbers with these keys and values.
 std::vector<SceneNumber> numbers_of(std::span<const std::string> keys, std::span<const double> values);
 
+/// The table of named numbers, "numbers.clamp" is the key of one.
+inline constexpr const char* named_numbers = "numbers.";
+
+/// These numbers, with the keys where they stand in place of named ones.
+std::vector<SceneNumber> driven_by(const Scene& scene, std::span<const SceneNumber> numbers);
+
 /// The key of the friction coefficient.
 inline constexpr const char* friction_coefficient_key = "friction.coefficient";
 

@@ -4,6 +4,8 @@
 /// This room includes neither PETSc nor MPI. Algorithms are chosen by PETSc options, with one prefix for each stage.
 #include "squeal/scene/model_parts.hpp"
 
+#include <span>
+
 namespace squeal
 {
 
@@ -176,13 +178,15 @@ template <> inline constexpr std::array words_of<SweepStages> = {"equilibrium", 
 /// Stability at many values of one number of the scene, or of two.
 struct SweepSettings
 {
-  std::vector<std::string> key; // of the numbers, as overrides name them
-  std::vector<double> from, to; // in the keys' units, one a key
-  std::vector<int> points{11};  // [-] of the grid, one a key
-  std::vector<double> values;   // of a single key, instead of a grid
-  int samples = 0;              // [-] number of random points of the ranges, instead of a grid; 0: none
-  int seed = 1;                 // [-] of the random points
-  SweepDirections directions{}; // of rotation
+  std::vector<std::string> key;              // of the numbers, as overrides name them
+  std::vector<double> from, to;              // in the keys' units, one a key
+  std::vector<int> points{11};               // [-] of the grid, one a key
+  std::vector<double> values;                // of a single key, instead of a grid
+  std::filesystem::path table{};             // CSV file of design points instead, a column a key; absolute
+  std::vector<std::vector<double>> design{}; // its points; no key of its own
+  int samples = 0;                           // [-] number of random points of the ranges, instead of a grid; 0: none
+  int seed = 1;                              // [-] of the random points
+  SweepDirections directions{};              // of rotation
   SweepStages stages = SweepStages::modes;
 };
 
@@ -253,9 +257,19 @@ struct Probe
   Vec3 direction{};       // [-] unit vector
 };
 
+/// A place of the scene where a named number stands.
+struct NumberUse
+{
+  std::string key; // of that place, as overrides name it
+  std::string name;
+  double sign = 1; // -1: the number stands there with a minus
+};
+
 /// All tables of a scene file.
 struct Scene
 {
+  std::map<std::string, double> numbers; // by the names that other keys have for values
+  std::vector<NumberUse> number_uses;    // no key of its own
   std::string title;
   CycleModel fidelity = CycleModel::automatic;
   double accuracy = 1e-3;                        // [-] required relative accuracy of the cycle's frequency and energy
@@ -276,6 +290,7 @@ struct Scene
   std::vector<Pressure> pressures;
   std::vector<Bolt> bolts;
   Vec3 gravity{}; // [m/s2]
+  std::vector<Rotor> rotors;
   std::vector<Contact> contacts;
   std::vector<LoadStep> steps; // to the scene's loads and friction, in order; empty: at once
   std::vector<InitialMotion> initial;
@@ -303,10 +318,14 @@ struct Scene
 /// key.
 Scene read_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides);
 
+/// Gives every contact the drive of a rotor of the scene, by the rotor's place; -1: it has none. Throws Error for a
+/// contact that has a drive of its own too, and for a rotor that drives nothing.
+void drive_contacts(Scene& scene, std::span<const int> rotors);
+
 /// A sentence for each material that no solid has and each mass that none has, which a slip of units explains, and for
 /// each load that does nothing or turns round, or setting that nothing uses. Of gaps and compliances beside the model's
-/// length [m], unless that is 0.
-std::vector<std::string> doubts_about(const Scene& scene, double length);
+/// length [m], and of its mass [kg], unless that is 0.
+std::vector<std::string> doubts_about(const Scene& scene, double length, double mass);
 
 /// Returns the scene as TOML with all defaults; read_scene of it gives the same scene.
 std::string resolved_scene(const Scene& scene);

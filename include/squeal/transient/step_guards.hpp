@@ -6,8 +6,7 @@
 /// - theta > 1/2 with fewer than 2 pi (theta - 1/2) |lambda|^2/(omega sigma) steps a period: what grows looks stable;
 /// - theta < 1/2 with fewer than 2 pi (1/2 - theta) |lambda|^2/(omega sigma): most of the growth is the scheme's own;
 /// - theta < 1/2 also amplifies every stable mode with -Re(lambda) < (1/2 - theta) h |lambda|^2, up to the highest one
-///   of the mesh. With C = beta K that is h > beta/(1 - 2 theta), or h > 2/((1 - 2 theta) |lambda|) where the mode is
-///   overdamped, lambda its faster root.
+///   of the mesh. No run is refused for it: the march says so, and ends where its energy is no longer finite.
 /// - friction falls with the speed so steeply that a step may have several solutions. The largest eigenvalue of |mu'|
 ///   diag(r_n0) W_tt, at rest, is not below 1. W holds h, so that enough steps bring it below. Ramps raise mu and r_n0
 ///   by the largest product of their factors.
@@ -21,14 +20,9 @@ namespace squeal
 /// ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h [1/s]. lambda in [1/s], h in [s]. Not collective.
 std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double theta, double h);
 
-/// The asymptotic growth of the energy norm in one step of the structure without load and contact, as a logarithm. It
-/// is found by 300 steps from a state that excites every mode. Collective; factors A anew.
-double free_growth(const Structure& structure, double theta, double h, const FactorOptions& options);
-
 /// Why a run with this theta and h is refused, in a sentence with the remedy; empty if it is not. `mode`: the followed
-/// one, or null. Collective.
-std::string step_refusal(const Structure& structure, const ComplexMode* mode, double theta, double h,
-                         const StepOptions& options);
+/// one, or null. Not collective.
+std::string step_refusal(const ComplexMode* mode, double theta, double h, const StepOptions& options);
 
 /// The largest eigenvalue of |mu'| diag(r_n) W_tt with the steepest fall of mu; 0 where mu does not fall. A step has
 /// one solution while it is below 1. Collective.
