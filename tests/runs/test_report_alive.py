@@ -4,6 +4,7 @@ import base64
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import zlib
@@ -82,6 +83,17 @@ def test_the_effective_radius_gives_the_torque(pin):
     assert mu * place.force * place.radius == pytest.approx(abs(contact["torque"]), rel=1e-6)
     assert place.speed == pytest.approx(20 * place.radius) and place.leading[1] < place.centre[1] < place.trailing[1]
     assert place.marks()["name"] == "pin_face on disc_face"
+
+
+def test_a_rotor_drives_the_contacts_of_its_part(pin, tmp_path):
+    """As the contact's own rotation does; a part that touches no contact drives none."""
+    for part, radius in (("disc", places_of(pin)[0].radius), ("pin", None)):
+        shutil.copytree(pin.folder, tmp_path / part)
+        file = tmp_path / part / "resolved.toml"
+        text, count = re.subn(r"\nrotation = (\{.*rate.*\})", "", file.read_text())
+        file.write_text(text + f'\n[[rotor]]\npart = "{part}"\naxis = [0, 0, 1]\nrate = 20\n')
+        (place,) = places_of(squeal.Results(tmp_path / part))
+        assert count == 1 and place.radius == radius
 
 
 def test_a_pad_all_round_the_axis_has_no_edges_and_one_on_a_belt_has():

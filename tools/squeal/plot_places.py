@@ -1,7 +1,9 @@
 """Where each contact presses: centre of pressure, effective radius, the way of its rotor, leading and trailing edge."""
 
 import numpy as np
+from scipy.spatial import cKDTree
 from squeal.plot_basis import scene_of
+from squeal.surface import by_part
 
 ALL_ROUND = 330  # degrees about the axis from which on a contact has no edges
 EDGE = 0.04  # part of a contact's length along the way that counts as its edge
@@ -14,7 +16,7 @@ class Place:
     def __init__(self, number, contact, points, forces, normal):
         """contact: its table in the scene; points, forces: of its pairs [m, N]; normal: their mean, out of the rotor."""
         self.number, self.name = number, f"{contact.get('stator', 'stator')} on {contact.get('rotor', 'rotor')}"
-        self.points, self.force = points, forces.sum()
+        self.contact, self.points, self.force = contact, points, forces.sum()
         weights = forces if self.force > 0 else np.ones(len(forces))
         self.centre = np.average(points, axis=0, weights=weights)
         self.normal = normal / max(np.linalg.norm(normal), 1e-300)
@@ -62,11 +64,35 @@ class Place:
         return {name: plain(getattr(self, name)) for name in names} | {"size": float(np.linalg.norm(np.ptp(self.points, axis=0)))}
 
 
+def drive_of(run, scene, contact, points, node):
+    """A contact's table with the drive of the [[rotor]] that it takes: that of the part nearest to its pairs beside their own.
+    points, node: of its pairs."""
+    rotors = {rotor["part"]: rotor for rotor in scene.get("rotor", [])}
+    if not rotors or contact.get("rotation", {}).get("rate") or np.any(contact.get("velocity", 0)):
+        return contact
+    found = rotors.get(contact.get("rotor"))
+    if not found and (run.folder / "fields.h5").exists():
+        parts = by_part(run.field("mesh/topology"), run.field("mesh/part"))
+        nodes = {scene["part"][k]["name"]: np.unique([at for _, of in elements for at in of]) for k, elements in parts.items()}
+        owner = next((name for name, own in nodes.items() if node[0] in own), None)
+        beside = {name: np.median(cKDTree(run.nodes[own]).query(points)[0]) for name, own in nodes.items() if name != owner}
+        rotor = owner if contact.get("slave") == "rotor" else min(beside, key=beside.get, default=None)
+        found = rotors.get(rotor)
+    if not found:
+        return contact
+    turns = {"rotation": {name: found[name] for name in ("axis", "centre", "rate") if name in found}} if found.get("rate") else {}
+    return contact | turns | ({"velocity": found["velocity"]} if np.any(found.get("velocity", 0)) else {})
+
+
 def places_of(run):
     """Every contact that has pairs, in the order of the scene."""
     if not run.report["model"]["pairs"] or not (run.folder / "fields.h5").exists():
         return []
-    contact, points, normal = (run.field(f"pairs/{name}") for name in ("contact", "position", "normal"))
-    forces, tables = run.field("pairs/reaction")[:, 0], scene_of(run).get("contact", [])
-    return [Place(int(k), tables[k] if k < len(tables) else {}, points[contact == k], np.maximum(forces[contact == k], 0),
-                  normal[contact == k].mean(axis=0)) for k in np.unique(contact)]
+    contact, points, normal, node = (run.field(f"pairs/{name}") for name in ("contact", "position", "normal", "node"))
+    forces, scene, found = run.field("pairs/reaction")[:, 0], scene_of(run), []
+    tables = scene.get("contact", [])
+    for k in np.unique(contact):
+        of = contact == k
+        driven = drive_of(run, scene, tables[k] if k < len(tables) else {}, points[of], node[of])
+        found.append(Place(int(k), driven, points[of], np.maximum(forces[of], 0), normal[of].mean(axis=0)))
+    return found

@@ -44,8 +44,10 @@ def drive(contact):
 
 
 def friction_words(scene, contact):
-    of = scene.get("friction", {}) | contact.get("friction", {}) if isinstance(contact.get("friction", {}), dict) else scene.get("friction", {})
-    words = number(of.get("coefficient"))
+    """Its own coefficient and law, else those of all contacts."""
+    of = scene.get("friction", {}) | {name: contact[name] for name in ("static_coefficient", "decay_speed") if contact.get(name)}
+    own = contact.get("friction")
+    words = number(of.get("coefficient") if own is None else own)
     if of.get("decay_speed"):
         words += f", {number(of.get('static_coefficient'))} at a speed of zero, falling over {number(of['decay_speed'])} m/s"
     return words
@@ -57,7 +59,7 @@ def contact_rows(run, scene):
         place = places.get(k)
         milli = lambda value: "–" if value is None else number(1e3 * value, 4)
         centre = vector(1e3 * np.where(np.abs(place.centre) < 1e-9, 0, place.centre)) if place else "–"
-        yield [text(f"{contact.get('stator', '')} on {contact.get('rotor', '')}"), friction_words(scene, contact), drive(contact),
+        yield [text(f"{contact.get('stator', '')} on {contact.get('rotor', '')}"), friction_words(scene, contact), drive(place.contact if place else contact),
                number(float(place.force)) if place else "–", centre, milli(place.radius if place else None),
                number(float(place.speed), 4) if place and place.speed else "–"]
 
