@@ -1,5 +1,6 @@
 """tools/mesh: what decks say beside their mesh becomes tables of a scene that runs without an edit."""
 
+import subprocess
 import sys
 import tomllib
 
@@ -340,9 +341,9 @@ def test_universal_files_keep_groups(tmp_path):
 
 
 @pytest.mark.parametrize("old, new, words", [
-    ("       111         2         1         7         4", "       112         2         1         7         6", ["line 21", "nodes of element 3", "expected 6"]),
-    ("wedge\n         8         3         0         0\n", "wedge\n", ["line 31", "0 entities of wedge"]),
-    ("       111 ", "       113 ", ["line 21", "wedges of 15 nodes"]),
+    ("       111         2         1         7         4", "       112         2         1         7         6", ["line 19", "nodes of element 3", "expected 6"]),
+    ("wedge\n         8         3         0         0\n", "wedge\n", ["line 30", "0 entities of wedge"]),
+    ("       111 ", "       113 ", ["line 19", "wedges of 15 nodes"]),
     ("1.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00\n         3", "x 0 0\n         3", ["line 6", "'x'"]),
 ])
 def test_bad_universal_files_are_refused(tmp_path, old, new, words):
@@ -351,6 +352,24 @@ def test_bad_universal_files_are_refused(tmp_path, old, new, words):
     with pytest.raises(TOOL.Problem) as refused:
         TOOL.read_deck(tmp_path / "deck.unv")
     assert all(word in str(refused.value) for word in words), refused.value
+
+
+def test_bodies_of_step_files_are_parts(tmp_path):
+    """Two boxes by gmsh: parts by the names of the solids, faces by numbers, volumes and areas of the boxes."""
+    (tmp_path / "a.geo").write_text('SetFactory("OpenCASCADE");\nBox(1) = {0, 0, 0, 40, 20, 10};\nBox(2) = {0, 0, 10, 10, 10, 5};\n')
+    subprocess.run(["gmsh", "a.geo", "-0", "-o", "a.step", "-v", "1"], cwd=tmp_path, check=True)
+    text = (tmp_path / "a.step").read_text()
+    assert text.count("MANIFOLD_SOLID_BREP(''") == 2
+    text = text.replace("MANIFOLD_SOLID_BREP(''", "MANIFOLD_SOLID_BREP('disc'", 1).replace("MANIFOLD_SOLID_BREP(''", "MANIFOLD_SOLID_BREP('pad 1'")
+    with pytest.raises(TOOL.Problem, match="give --size"):
+        (tmp_path / "a.step").write_text(text)
+        TOOL.read_deck(tmp_path / "a.step")
+    model = TOOL.read_deck(tmp_path / "a.step", 10.0)
+    volume = {name: sum(np.linalg.det([model.nodes[n] - model.nodes[model.elements[e][1][0]] for n in model.elements[e][1][1:4]]) / 6
+                        for e in part.elements) for name, part in model.parts.items()}
+    assert volume == {"disc": pytest.approx(8000, rel=1e-12), "pad_1": pytest.approx(500, rel=1e-12)}
+    assert {name for name in model.surfaces if name.startswith("pad_1")} == {f"pad_1_face_{i}" for i in range(1, 7)}
+    assert all(kind == "tet10" for kind, _ in model.elements.values())
 
 
 def slid(scene):

@@ -43,7 +43,7 @@ class Block:
         self.texts, self.numbers, self.files = [], [], []  # of the lines; files as (first line that is theirs, file)
 
     def add(self, file, number, text):
-        if not self.files or self.files[-1][1] != file:
+        if not self.files or self.files[-1][1] is not file:
             self.files.append((len(self.texts), file))
         self.texts.append(text)
         self.numbers.append(number)

@@ -6,6 +6,7 @@ from squeal.abaqus_deck import read_inp
 from squeal.ansys_deck import read_cdb
 from squeal.deck_files import Problem
 from squeal.nastran_deck import read_bdf
+from squeal.step_deck import read_step
 from squeal.unv_deck import read_unv
 
 # what a line of the beginning looks like, and how many of its like are there at most before the reader is chosen
@@ -36,14 +37,14 @@ def kind_of(file):
     return best if found[best] else ENDINGS.get(file.suffix.lower(), "")
 
 
-def read_deck(file):
+def read_deck(file, size=0.0):
     if not file.is_file():
         raise Problem(f"there is no file {file}")
     kind = kind_of(file)
     if kind in READERS:
         return finished(READERS[kind](file), file)
     if kind == "step":
-        raise Problem(f"{file}: a geometry, of which a mesh is to be made: give --size, the size of its elements")
+        return finished(read_step(file, size), file)
     from squeal import common
 
     common.needs("meshio")

@@ -72,6 +72,7 @@ class Model:
         self.gravity = None
         self.band = 0.0  # [Hz] of the modes that the deck asks for
         self.notes = []  # what the deck has and the scene has not
+        self.free_of_all = (-1, {})  # number of solids, and their free faces
         self.places = {}  # of the elements in the deck: texts, or blocks that find them
 
     def add_element(self, place, number, kind, nodes, code):
@@ -116,12 +117,20 @@ class Model:
         return True
 
     def free_faces(self, numbers):
-        """Faces that belong to one of these solid elements alone, by their corners."""
-        owners, keys = [], []
-        for kind, (_, _, _, faces) in KINDS.items():
-            of_kind = [n for n in numbers if self.elements[n][0] == kind]
-            if not of_kind:
-                continue
+        """Faces that belong to one of these solid elements alone, by their corners. Those of all are found once."""
+        count = len(self.solids())
+        if len(numbers) < count:
+            return self.faces_of_one(numbers)
+        if self.free_of_all[0] != count:
+            self.free_of_all = count, self.faces_of_one(numbers)
+        return self.free_of_all[1]
+
+    def faces_of_one(self, numbers):
+        by_kind, owners, keys = {}, [], []
+        for n in numbers:
+            by_kind.setdefault(self.elements[n][0], []).append(n)
+        for kind, of_kind in by_kind.items():
+            faces = KINDS[kind][3]
             nodes = np.array([self.elements[n][1] for n in of_kind])
             for i, face in enumerate(faces):
                 owners.append(np.stack([of_kind, np.full(len(of_kind), i)], axis=1))
