@@ -36,7 +36,7 @@ namespace
 /// By the entries of a symmetric factor.
 bool is_made_whole(double entries, Symmetry symmetry, const PencilOptions& options, MPI_Comm comm)
 {
-  const double gigabytes = (symmetry == Symmetry::symmetric ? 1 : 2) * entries * sizeof(double) / 1e9;
+  const double gigabytes = (symmetry == Symmetry::none ? 2 : 1) * entries * sizeof(double) / 1e9;
   return ranks_of(comm) > 1 && gigabytes <= options.whole_limit;
 }
 
@@ -114,7 +114,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   Parts& parts = *parts_;
   parts.comm = comm_of(K);
   parts.layout = row_layout(K);
-  const bool symmetric = symmetry == Symmetry::symmetric;
+  const bool symmetric = symmetry != Symmetry::none;
   const EliminationOrder made = known ? EliminationOrder{} : elimination_order(K), &order = known ? *known : made;
   std::vector<MUMPS_INT> positions(order.position.begin(), order.position.end());
   parts.whole = is_made_whole(order.entries, symmetry, options, parts.comm);
@@ -132,6 +132,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   parts.K = std::move(entries.value); // MUMPS's pointer to them stays valid
   DMUMPS_STRUC_C& mumps = *parts.mumps;
   control(mumps, 14) = to_int(options.room);
+  if (symmetry == Symmetry::counted) control(mumps, 31) = 1; // the factor is discarded, front by front
   set_controls_from_options(mumps, "modes_");
   mumps.perm_in = positions.data();
   parts.run_together([&] { run(mumps, MumpsJob::analyse); });

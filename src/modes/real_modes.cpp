@@ -94,7 +94,7 @@ Inertia inertia_at(double limit, ShiftInvert& pencil)
 ShiftInvert& pencil_of(RealCount& count)
 {
   if (!count.pencil.factor)
-    count.pencil = make_shift_invert(count.K, count.M, Symmetry::symmetric, count.options, &order_of(count));
+    count.pencil = make_shift_invert(count.K, count.M, Symmetry::counted, count.options, &order_of(count));
   return count.pencil;
 }
 
@@ -247,8 +247,9 @@ std::vector<double> omegas_between(RealCount& count, double least, double top)
     std::for_each(count.all.begin(), count.all.end(), take);
   else
   {
-    ShiftInvert& pencil = pencil_of(count);
-    if (pencil.shift != top * top) move_to(pencil, top * top);
+    free_factor(count); // before one that is kept
+    ShiftInvert pencil = make_shift_invert(count.K, count.M, Symmetry::symmetric, count.options, &order_of(count));
+    move_to(pencil, top * top);
     const Nearest nearest = solve_nearest(pencil, 1, top * top - least * least, 1e-4);
     for (const std::complex<double> theta : nearest.theta) take(theta.real());
   }

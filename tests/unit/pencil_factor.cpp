@@ -52,11 +52,13 @@ TEST_CASE("solutions and counts do not depend on how the ranks make the factor")
     const PencilOptions options{.whole_limit = whole_limit}; // shared by the ranks, of which some have no rows; whole
     const Owned<Mat> M = mass(size), K = stiffness(size, 0.3), symmetric = stiffness(size, 0);
     const Owned<Mat> transposed = transpose_of(K);
-    PencilFactor factor(K, M, Symmetry::none, options), counting(symmetric, M, Symmetry::symmetric, options);
+    PencilFactor factor(K, M, Symmetry::none, options), counting(symmetric, M, Symmetry::symmetric, options),
+        discarding(symmetric, M, Symmetry::counted, options);
     for (const double shift : {-1., 2.6})
     {
       REQUIRE(factor.factorise(shift));
       REQUIRE(counting.factorise(shift));
+      REQUIRE(discarding.factorise(shift));
       for (const PetscInt columns : {1, 2, 7})
       {
         const MultiVector B = random_multivector(K, columns);
@@ -66,6 +68,7 @@ TEST_CASE("solutions and counts do not depend on how the ranks make the factor")
       }
       int below = counting.negative_pivots();
       CHECK((shift < 0 ? below == 0 : below > 0));
+      CHECK(discarding.negative_pivots() == below);
       MPI_Bcast(&below, 1, MPI_INT, 0, PETSC_COMM_WORLD);
       CHECK(below == counting.negative_pivots()); // on all ranks
     }

@@ -15,6 +15,7 @@ enum class Symmetry
 {
   none,      // L U
   symmetric, // L D L', which counts eigenvalues
+  counted,   // L D L', of which nothing but that count is kept
 };
 
 /// Options of all factors by MUMPS of the modes.
@@ -46,10 +47,10 @@ public:
   /// Returns false if the shift is an eigenvalue. Throws LibraryError if memory runs out.
   bool factorise(double shift);
 
-  /// The number of eigenvalues below the shift (Sylvester's law of inertia). For Symmetry::symmetric only.
+  /// The number of eigenvalues below the shift (Sylvester's law of inertia). Not of Symmetry::none.
   int negative_pivots() const;
 
-  /// (K - shift M)^-1 X
+  /// (K - shift M)^-1 X; not of Symmetry::counted.
   MultiVector solve(const MultiVector& X) const;
 
   /// (K - shift M)'^-1 X
