@@ -116,6 +116,7 @@ std::string command_of(int argc, char** argv)
 Arguments take_arguments(int& argc, char** argv)
 {
   Arguments arguments;
+  arguments.program = shell_word(argv[0]);
   arguments.command = command_of(argc, argv);
   int kept = 1;
   for (int i = 1; i < argc; ++i)

@@ -154,6 +154,7 @@ int run_program(const Arguments& arguments)
   ProgramOptions options = read_program_options(comm);
   options.force = arguments.force;
   options.length = arguments.length;
+  options.program = arguments.program;
   options.command = arguments.command;
   Scene scene;
   on_every_rank(comm, [&] { scene = read_scene(arguments.scene, arguments.overrides); });

@@ -140,6 +140,7 @@ ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results,
 {
   Report report;
   report.run = results.run();
+  report.program = options.program;
   if (const int ranks = ranks_of(comm); ranks > 1) report.command = "mpirun -n " + std::to_string(ranks) + " ";
   report.command += options.command;
   report.place = results.place();

@@ -14,7 +14,7 @@ struct Arguments
   std::filesystem::path scene, output;
   std::vector<std::string> overrides;
   RunLimits limits;
-  std::string command; // as a shell takes it
+  std::string program, command; // as a shell takes them; the command begins with the program
   TableLength length{};
   bool restart = false, dry_run = false, help = false, version = false, allow_scripts = false, force = false;
   std::string reference;            // page to print; empty: none

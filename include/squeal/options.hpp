@@ -22,9 +22,9 @@ struct ProgramOptions
   CycleOptions cycle;
   SettledOptions settled;
   SweepOptions sweep;
-  bool force = false;    // --force: run whatever the forecast says
-  TableLength length{};  // --verbose: full
-  std::string command{}; // by which the program was called
+  bool force = false;               // --force: run whatever the forecast says
+  TableLength length{};             // --verbose: full
+  std::string program{}, command{}; // by which the program was called
   ResponseOptions response;
 };
 

@@ -258,7 +258,7 @@ std::string options_to_go_on(const Report& report, const Scene& scene)
 std::string next_command(const Report& report, const Scene& scene)
 {
   const std::string options = options_to_go_on(report, scene);
-  return options.empty() ? "tools/report " + report.place.string() : report.command + options;
+  return options.empty() ? report.program + " report " + report.place.string() : report.command + options;
 }
 
 std::string heard(const Report& report, const Scene& scene)

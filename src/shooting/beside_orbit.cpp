@@ -165,9 +165,7 @@ void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipli
   if (multipliers.stability != Stability::undecided || !multipliers.complete) return;
   for (std::size_t i = 1; i < multipliers.values.size(); ++i)
     if (multipliers.values[i] != std::conj(multipliers.values[0]) && !(multipliers.upper_bound(i) < 1)) return;
-  // a grid of time moves a shift along the orbit, which nothing moves, and so any other motion that nothing moves
-  const std::complex<double> largest = multipliers.values.front();
-  const double of_grid = largest.imag() == 0 && largest.real() > 0 ? multipliers.trivial_error : 0;
+  const double of_grid = moved_by_grid(multipliers, multipliers.values.front());
   if (of_grid > std::abs(nearest.growth - 1))
     multipliers.would_decide = format(
         "a motion beside the cycle grows %.4f times a period, but the grid of time moves a shift in time by %.1e: "

@@ -69,6 +69,11 @@ Crossing crossing_of(std::complex<double> multiplier)
   return multiplier.real() < 0 ? Crossing::period_doubling : Crossing::fold;
 }
 
+double moved_by_grid(const Multipliers& multipliers, std::complex<double> value)
+{
+  return value.imag() == 0 && value.real() > 0 ? multipliers.trivial_error : 0;
+}
+
 void decide(Multipliers& multipliers, const Completeness& coverage)
 {
   multipliers.complete = coverage.complete;

@@ -68,8 +68,8 @@ std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const Eigen
 /// All multipliers. Bars: the change of each when the grid of time moves by half a step, and 4/3 of the change on one
 /// of twice as many steps, which is the error of a step of order 2. A contact that hits a mass moves it within a step
 /// by what the grid allows, and a grid with a whole number of steps a period places each impact at one point of its
-/// step. So the bars hold as well what changes along eight periods in 8 N + 1 steps, which place it at eight points,
-/// and by how much the multiplier of the shift in time misses 1 on either grid.
+/// step. So the bars hold as well what changes along eight periods in 8 N + 1 steps, which place it at eight points.
+/// Those of real multipliers hold by how much that of the shift in time misses 1 on either grid.
 FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
 {
   FloquetAnalysis result;
@@ -119,8 +119,9 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
     for (std::size_t k = 0; k < others.size(); ++k)
     {
       const auto i = static_cast<std::size_t>(places[k]);
-      grid.errors[i] = std::max(grid.errors[i], std::abs(others[k] - values[i]));
-      grid.rises[i] = std::max(grid.rises[i], std::abs(others[k]) - std::abs(values[i]));
+      constexpr double with_its_own = 1.5; // error: an eighth of this grid's, or by chance some more
+      grid.errors[i] = std::max(grid.errors[i], with_its_own * std::abs(others[k] - values[i]));
+      grid.rises[i] = std::max(grid.rises[i], with_its_own * (std::abs(others[k]) - std::abs(values[i])));
       if (i == shift) multipliers.trivial_error = std::max(multipliers.trivial_error, std::abs(others[k] - 1.));
     }
   }
@@ -128,7 +129,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   {
     if (i == shift) continue;
     constexpr double rounding = 1e-9;
-    const double least = std::max(rounding, multipliers.trivial_error);
+    const double least = std::max(rounding, stays ? moved_by_grid(multipliers, values[i]) : multipliers.trivial_error);
     multipliers.values.push_back(values[i]);
     multipliers.errors.push_back(std::max(grid.errors[i], least));
     multipliers.upper.push_back(std::abs(values[i]) + std::max(grid.rises[i], least));
@@ -136,13 +137,6 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   pairs.erase(pairs.begin() + static_cast<std::ptrdiff_t>(shift));
   if (pairs.empty()) return result;
   decide(multipliers, {true, ""});
-  if (multipliers.stability == Stability::undecided &&
-      multipliers.trivial_error > 0.5 * multipliers.errors[deciding_place(multipliers)])
-    multipliers.would_decide = format(
-        "the multiplier of a shift in time, which is 1, misses it by %.1e along a grid of time, as where contact "
-        "hits masses within steps: contact with a compliance would decide, or -cycle_watched_periods where the "
-        "largest value alone reaches across 1",
-        multipliers.trivial_error);
   result.fastest =
       fastest_motion(monodromy.flow, pairs.front(), [&](const Eigen::VectorXd& y) { return state_at(Q * y, orbit); });
   return result;

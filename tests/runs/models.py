@@ -151,6 +151,18 @@ def write_matrices(folder, B, gap, drive, F, **matrices):
     return folder
 
 
+def sticking_slider(folder, friction, **tables):
+    """Three degrees of freedom on one pair, whose friction falls with speed: the cycle sticks once a period."""
+    write_matrices(folder / "m", [[-0.855495989, -0.146312857, -0.496708326], [-0.005258296, -0.956745071, 0.290880076]], [0],
+                   [0.953932671], [0.705351327, -0.186085676, 0.444300888], M=np.diag([0.993734116, 1.550371814, 1.63931418]),
+                   C=[[0.013519347, 7.0115e-05, 0.000374628], [7.0115e-05, 0.020475594, -0.000142082],
+                      [0.000374628, -0.000142082, 0.021033343]],
+                   K=[[0.679804879, 0.026241817, 0.140211969], [0.026241817, 0.829827935, -0.053176898],
+                      [0.140211969, -0.053176898, 0.646545324]])
+    return write_scene(folder, matrices={"folder": "m"}, modes={"band": 20.0}, estimate={"enabled": False},
+                       friction={"static_coefficient": 4.314953387, "decay_speed": 1.155236965, **friction}, **tables)
+
+
 def write_coexistence(folder, friction, cycle, **tables):
     """Four degrees of freedom on two pairs. Between mu = 0.45 and 0.5 equilibrium and a cycle attract: slip that reverses makes
     the cycle, which a small motion never reaches."""

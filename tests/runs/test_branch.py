@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 from conftest import INPUTS, ROOT
-from models import write_coexistence, write_matrices, write_scene
+from models import sticking_slider, write_coexistence, write_matrices, write_scene
 
 SCENE = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=200",
          "--set", "fidelity=full"]
@@ -223,14 +223,7 @@ def test_a_branch_is_followed_where_the_map_of_a_period_jumps(converged, tmp_pat
 def test_a_branch_goes_round_the_corner_where_stick_begins(converged, tmp_path):
     """The stable cycle sticks up to its end: marching with 400 to 8000 steps a period holds it at mu = 4.2423 and no longer at
     4.2426. The branch turns there at once, to cycles that only slide and repel, and no point of it is beyond its fold."""
-    write_matrices(tmp_path / "m", [[-0.855495989, -0.146312857, -0.496708326], [-0.005258296, -0.956745071, 0.290880076]], [0],
-                   [0.953932671], [0.705351327, -0.186085676, 0.444300888], M=np.diag([0.993734116, 1.550371814, 1.63931418]),
-                   C=[[0.013519347, 7.0115e-05, 0.000374628], [7.0115e-05, 0.020475594, -0.000142082],
-                      [0.000374628, -0.000142082, 0.021033343]],
-                   K=[[0.679804879, 0.026241817, 0.140211969], [0.026241817, 0.829827935, -0.053176898],
-                      [0.140211969, -0.053176898, 0.646545324]])
-    scene = write_scene(tmp_path, matrices={"folder": "m"}, modes={"band": 20.0}, cycle={"steps_per_period": 400},
-                        friction={"coefficient": 4.15, "static_coefficient": 4.314953387, "decay_speed": 1.155236965})
+    scene = sticking_slider(tmp_path, {"coefficient": 4.15}, cycle={"steps_per_period": 400, "start": "mode", "amplitude": 1.3})
     branch = converged(scene, *branch_of("friction.coefficient", 4.1, 4.3), "--set", "branch.points=4", ranks=1).report["branch"]
     fold, = [event for event in branch["events"] if event["kind"] == "fold"]
     assert 4.2423 - fold["error"] <= fold["parameter"] <= 4.2426 + fold["error"] and fold["error"] < 1e-3

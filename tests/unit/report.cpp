@@ -279,6 +279,7 @@ TEST_CASE(
 {
   const Model model = one_of_each();
   Report report = full_report(model);
+  report.program = "squeal";
   report.command = "squeal scene";
   report.place = "results/scene";
   report.model.warnings = {"first", "second"};
@@ -290,7 +291,7 @@ TEST_CASE(
   CHECK(has(found, "\n  cycle        converged, frequency 100 Hz"));
   CHECK(has(found, "\n    modes      frequency 100 Hz, growth rate 5 1/s"));
   CHECK(has(found, "\n  WARNING: first\n  WARNING: second\n"));
-  CHECK(has(found, "\n  next         tools/report results/scene\n"));
+  CHECK(has(found, "\n  next         squeal report results/scene\n"));
   CHECK_FALSE(has(found, "FAILED"));
   report.motion.cycle.outcome = {OutcomeKind::not_converged, "the residual stalled", 9, 0.1};
   report.transient.energy_defect_max = 0.5;

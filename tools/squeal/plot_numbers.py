@@ -27,6 +27,18 @@ def axis_label(key, name="", unit="-"):
     return f"{words_of(key, name)} [{unit}]"
 
 
+def value_of(scene, key):
+    """A number of a scene by its key, where entries of lists are told by number or name; None where it is not there."""
+    at = scene
+    for word in key.split("."):
+        if isinstance(at, list):
+            named = [entry for entry in at if isinstance(entry, dict) and entry.get("name") == word]
+            at = named[0] if named else at[int(word)] if word.isdigit() and int(word) < len(at) else None
+        else:
+            at = at.get(word) if isinstance(at, dict) else None
+    return at if isinstance(at, (int, float)) else None
+
+
 def unit_of_key(run, key):
     """What the file of the scene with every default says behind a number."""
     file, section, count = run.folder / "resolved.toml", "", {}

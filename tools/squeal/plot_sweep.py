@@ -5,12 +5,13 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.tri import LinearTriInterpolator, Triangulation
-from squeal.plot_basis import frequency_unit, heading, label_row, legend_below, plt, those_with
-from squeal.plot_numbers import axis_label, words_of
+from squeal.plot_basis import frequency_unit, heading, label_row, legend_below, plt, scene_of, those_with
+from squeal.plot_numbers import axis_label, value_of, words_of
 from squeal import Missing
 
 COLOURS = ["#c0272d", "#1b6ca8", "#d95f02", "#2e8b57", "#7b3fa0", "#b5893a", "#008b8b", "#d6409f"]
 MARKS = "os^Dvp*X"
+SAME = 0.01  # of its frequency, within which a followed mode is one of the run's own
 SHADES = ["black", "#1b6ca8", "#7b3fa0"]  # of marks on the yellow and red of a map
 
 
@@ -111,8 +112,26 @@ def thresholds_of(sweep, direction, track=None):
     return [t for t in sweep["thresholds"] if t["direction"] == direction and track in (None, t["track"])]
 
 
-def draw_column(axes, table, rows, sweep, size, direction):
-    """One direction of rotation: frequencies above, growth rates below; modes that are unstable somewhere in colour."""
+def own_modes(results, sweep, table):
+    """By followed mode the number of the run's own mode that it passes through, where the sweep passes the scene's own value."""
+    own, modes = value_of(scene_of(results), sweep["keys"][0]), results.report.get("modes", {}).get("modes", [])
+    rows = ordered_rows(table, table["direction"] == 1)
+    number = table["value"][rows, 0]
+    if own is None or not modes or not len(rows) or not number[0] <= own <= number[-1]:
+        return {}
+    found, frequencies = {}, np.array([mode["frequency_hz"] for mode in modes])
+    growths = np.array([mode["growth_rate"] for mode in modes])
+    for track in range(table["frequency"].shape[1]):
+        at, rising = (np.interp(own, number, table[name][rows, track]) for name in ("frequency", "growth_rate"))
+        distance = np.hypot(frequencies - at, (growths - rising) / (2 * np.pi))  # both in Hz: partners that lock in differ in growth
+        if np.isfinite(at) and distance.min() < SAME * at:
+            found[track] = int(distance.argmin()) + 1
+    return found
+
+
+def draw_column(axes, table, rows, sweep, size, direction, own):
+    """One direction of rotation: frequencies above, growth rates below; modes that are unstable somewhere in colour. own: what a
+    click on a followed mode shows."""
     above, below = axes
     number = table["value"][rows, 0]
     coloured = strongest_tracks(sweep)
@@ -130,7 +149,9 @@ def draw_column(axes, table, rows, sweep, size, direction):
         x, along, rising = with_thresholds(number, frequency, growth, thresholds_of(sweep, direction, track))
         for ax, line, points in ((above, along / size, frequency / size), (below, rising, growth)):
             ax.plot(x, line, "-", color=colour, lw=1.4)
-            ax.plot(number, points, ls="", color=colour, marker=mark, ms=3.5)
+            marks, = ax.plot(number, points, ls="", color=colour, marker=mark, ms=3.5)
+            if track in own["modes"]:
+                marks.of_modes = {"run": own["run"], "modes": [own["modes"][track]] * len(number)}
         above.plot([], [], "-", color=colour, marker=mark, ms=3.5, lw=1.4, label=label)
     below.axhline(0, color="0.3", lw=0.8)
 
@@ -198,7 +219,8 @@ def draw_chart(results, sweep):
                                 sharex=True, sharey="row", squeeze=False)
     for column, direction in enumerate(directions):
         if table:
-            draw_column(axes[:2, column], table, ordered_rows(table, table["direction"] == direction), sweep, size, direction)
+            own = {"run": results.folder.name, "modes": own_modes(results, sweep, table) if direction == 1 else {}}
+            draw_column(axes[:2, column], table, ordered_rows(table, table["direction"] == direction), sweep, size, direction, own)
         else:
             draw_samples(axes[:2, column], sweep, size, direction)
         if rows_of_axes == 3:

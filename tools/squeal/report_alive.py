@@ -42,7 +42,8 @@ class Alive:
         name = f"charts-{len(self.charts)}"
         self.charts[name] = charts
         head = f'<p class="title">{html.escape(title)}</p>' if title else ""
-        return f'{head}<div class="charts" id="{name}" hidden></div>'
+        many = " many" if max(chart["columns"] for chart in charts) > 2 else ""
+        return f'{head}<div class="charts{many}" id="{name}" hidden></div>'
 
     def stage(self):
         """Where the 3D view comes, or why there is none."""

@@ -80,8 +80,8 @@ def name_of(axes, line):
 
 
 def parts_of(axes, forward):
-    """Everything in the axes, by kind, and whether that is all: an image or a map stays in the picture."""
-    found = {"whole": True, "lines": [], "at_x": [], "at_y": [], "segments": [], "areas": [], "images": [image_of(image) for image in axes.images]}
+    """Everything in the axes, by kind, and whether it has a map of cells, which stays a picture."""
+    found = {"map": False, "lines": [], "at_x": [], "at_y": [], "segments": [], "areas": [], "images": [image_of(image) for image in axes.images]}
     for line in axes.lines:
         kind, entry = line_of(axes, line, forward)
         found[kind].append(entry)
@@ -102,7 +102,7 @@ def parts_of(axes, forward):
         elif isinstance(collection, QuadMesh):
             found["images"].append(mesh_image(collection))
         else:
-            found["whole"] = False
+            found["map"] = True
     for bar in axes.patches:
         corners = bar.get_path().transformed(bar.get_patch_transform()).vertices[:4]
         found["areas"].append({"colour": colour_of(bar.get_facecolor()), "corners": [rounded(corners[:, 0]), rounded(forward(corners[:, 1]))], "bar": True})
@@ -150,8 +150,9 @@ def charts_of(figure):
         x, _ = axis_of(axes.xaxis, axes.get_xlim())
         y, forward = axis_of(axes.yaxis, axes.get_ylim())
         parts = parts_of(axes, forward)
-        whole &= parts.pop("whole")
-        if not any(parts[kind] for kind in ("lines", "segments", "areas", "images")):
+        is_map = parts.pop("map")
+        whole &= not is_map
+        if is_map or not any(parts[kind] for kind in ("lines", "segments", "areas", "images")):
             continue
         if not x["label"]:  # that of the axes below
             x["label"] = next((plain(other.get_xlabel()) for other in chosen if other.get_xlabel() and axes.get_shared_x_axes().joined(axes, other)), "")

@@ -42,7 +42,10 @@ async function startPage() {
       box.closest("figure").classList.add("started");
     };
     const seen = new IntersectionObserver(entries => entries.filter(e => e.isIntersecting).forEach(e => begin(e.target.querySelector(".charts"))), { rootMargin: "900px" });
-    document.querySelectorAll(".charts").forEach(box => { box.hidden = false; seen.observe(box.closest("figure")); });
+    const boxes = [...document.querySelectorAll(".charts")];
+    boxes.forEach(box => { box.hidden = false; seen.observe(box.closest("figure")); });
+    const rest = () => { if (boxes.length) { begin(boxes.shift()); setTimeout(rest, 30); } }; // those beyond the window, one by one
+    setTimeout(rest, 300);
   }
   window.report = { view, charts }; // to look at from the console
 }

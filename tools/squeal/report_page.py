@@ -35,7 +35,7 @@ TURNED = ("model", "shape", "shapes", "animation")  # pictures that the 3D view 
 def picture(content, kind, name, caption, charts="", whole=True):
     """Broad ones take the width of two. charts: what answers a pointer, in place of the picture if it is the whole of it."""
     width, height = Image.open(io.BytesIO(content)).size
-    classes = [word for word, true in (("broad", width > 2 * height), ("live", charts and whole),
+    classes = [word for word, true in (("broad", width > 2 * height or charts.count('class="charts many"')), ("live", charts and whole),
                                        ("turned", name in TURNED)) if true]
     return (f'<figure class="{" ".join(classes)}">{charts}<div class="wide"><img src="{data(content, kind)}" alt="{text(name)}: {text(caption)}">'
             f"</div><figcaption>{text(caption)}</figcaption></figure>")

@@ -77,6 +77,7 @@ struct BoltResult
 struct Report
 {
   std::string run;             // the identity that every file of the run carries
+  std::string program;         // as the shell called it; its word `report` is a tool
   std::string command;         // by which it was called, as a shell takes it
   std::filesystem::path place; // of its results
   std::string ended_by;        // "by SIGTERM" where the run was asked to end; empty: it was not
