@@ -47,8 +47,7 @@ class Writer:
         return self.scene.get(table, [])
 
     def write(self):
-        mesh = read_mesh(self.file.parent / self.scene["mesh"]["file"], self.scene["mesh"].get("parameters", {}))
-        self.mesh = mesh
+        mesh = self.mesh = read_mesh(self.file.parent / self.scene["mesh"]["file"], self.scene["mesh"].get("parameters", {}))
         self.fill_model()
         self.next_node = max(mesh.nodes) + 1
         self.next_element = len(self.model.elements) + 1
@@ -168,8 +167,6 @@ class Writer:
             self.notes += [f"rotation of part {name}"] if "rotation" in part else []
         self.notes += [f"{key} of [damping]" for key in ("measured", "loss_frequency") if key in self.scene.get("damping", {})]
         self.notes += [f"{key} of [friction]" for key in ("direction_damping", "slipped_pairs_stick") if key in self.scene.get("friction", {})]
-
-    # ---- bodies and joints
 
     def new_node(self, name, at):
         self.node_of[name] = self.next_node
@@ -308,8 +305,6 @@ class Writer:
             for first, second in zip(chain, chain[1:]):
                 self.element("B31", beam["name"], first, second)
             self.add(f"BEAM SECTION, ELSET={beam['name']}, SECTION=CIRC, MATERIAL=of_{beam['name']}", numbers([beam["diameter"] / 2]))
-
-    # ---- supports, contacts, loads
 
     def write_supports(self):
         for i, support in enumerate(self.many("support")):
