@@ -74,7 +74,9 @@ def of_pressure(runs, figure):
 def of_sweep(runs, figure):
     drawn = words_in(figure)
     maps = any(axes.get_label() == "<colorbar>" for axes in figure.axes)
-    return sentences(("Largest growth rate over the plane of two numbers.", maps), ("Frequency and growth of the modes against a number of the scene.", not maps),
+    counts = "points unstable" in drawn
+    return sentences(("Largest growth rate over the plane of two numbers.", maps), ("How many points have an unstable mode near a frequency.", counts),
+                     ("Frequency and growth of the modes against a number of the scene.", not maps and not counts),
                      ("Coloured modes are unstable somewhere, grey ones nowhere.", not maps and "grows most" in drawn),
                      ("Dotted lines are thresholds.", "threshold, with its value" in drawn), ("Larger marks are thresholds, one mark a mode.", "threshold of mode" in drawn),
                      ("Crosses are points that failed.", "point that failed" in drawn), ("Black marks are motions that were found there.", "cycle, " in drawn or "settled motion" in drawn))

@@ -11,6 +11,8 @@ WHOLE = ("friction", "damping", "mesh", "modes", "cycle", "transient")  # sectio
 def words_of(key, name=""):
     """Of a key of the scene, whose entry of a list may be told by its number or its name. name: what that entry is of."""
     section, *rest = key.split(".")
+    if section == "numbers":  # the scene's own words
+        return rest[0].replace("_", " ")
     axis = f" along {'xyz'[int(rest.pop())]}" if len(rest) > 1 and rest[-1] in ("0", "1", "2") else ""
     owner = "" if section in WHOLE or not rest else name or rest[0]
     inner = rest[1:] if section not in WHOLE else rest

@@ -368,8 +368,45 @@ def draw_map(results, sweep):
     return figure
 
 
+def signs_of(sweep):
+    """Name and sign of each point's number that has both, such as a speed in both directions; nothing: none has."""
+    for place, key in enumerate(sweep["keys"]):
+        signs = [np.sign(p["values"][place]) for p in sweep["points"]]
+        if min(signs) < 0 < max(signs):
+            return words_of(key, sweep["names"][place]), signs
+    return "", []
+
+
+def draw_occurrence(results, sweep):
+    """How many of the points of any numbers squeal, by the frequency of their unstable modes."""
+    keys = (*sweep["keys"], "direction")
+    known = [p for p in sweep["points"] if p["outcome"] == "converged"]
+    unstable = {}
+    for line in results.lines("sweep"):
+        if line["growth_rate"] and float(line["growth_rate"]) > 0:
+            unstable.setdefault(tuple(float(line[key]) for key in keys), []).append(float(line["frequency_hz"]))
+    found = [unstable.get((*p["values"], p["direction"]), []) for p in known]
+    every = [f for own in found for f in own] or [0, 1000]
+    size, unit = frequency_unit(max(every))
+    edges = np.linspace(0, 1.1 * max(every), 45)
+    name, signs = signs_of({**sweep, "points": known})
+    groups = [(f"{name} above 0", 1), (f"{name} below 0", -1)] if signs else [("", None)]
+    figure, ax = plt.subplots(figsize=(8, 4), layout="constrained")
+    for (label, sign), colour in zip(groups, COLOURS):
+        own = [f for i, f in enumerate(found) if sign is None or signs[i] == sign]
+        shares = [100 * sum(any(low <= f < high for f in one) for one in own) / max(len(own), 1) for low, high in zip(edges, edges[1:])]
+        counts = f"{sum(map(bool, own))} of {len(own)} points unstable"
+        ax.stairs(shares, edges / size, fill=True, alpha=0.6, color=colour, label=f"{label}: {counts}" if label else counts)
+    ax.set(xlabel=f"frequency of unstable modes [{unit}]", ylabel="points [%]", ylim=(0, 100))
+    figure.suptitle(heading([results], "occurrence of unstable modes"))
+    legend_below(figure, {label: handle for handle, label in zip(*ax.get_legend_handles_labels())})
+    return figure
+
+
 def draw_sweep(runs):
     (results, sweep), *_ = those_with(runs, sweep_of)
+    if len(sweep["keys"]) > 2:
+        return draw_occurrence(results, sweep)
     if len(sweep["keys"]) == 2:
         return draw_map(results, sweep)
     return draw_chart(results, sweep)
