@@ -131,8 +131,8 @@ ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<cons
   const auto count = static_cast<Index>(result.values.size()); // leading columns span the vectors of leading values
   // what the slow coordinates miss of both comes with one more passage
   result.right = result.known_right.leftCols(count);
-  result.left = orthonormal_columns(
-      apply_adjoint(map, period, contacts, with_fast_rows(left.leftCols(count), size, slow)));
+  result.left =
+      orthonormal_columns(apply_adjoint(map, period, contacts, with_fast_rows(left.leftCols(count), size, slow)));
   result.columns = columns;
   return result;
 }
