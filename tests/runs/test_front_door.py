@@ -11,7 +11,7 @@ from test_early_errors import refused
 PIN = INPUTS / "pin_on_disc"
 QUICK = ["--set", "mesh.parameters.divisions=2"]
 MODES = [*QUICK, "--set", "cycle.enabled=false"]
-OWN = 'rotation = { axis = "z", rate = 20 } # rad/s'
+OWN = 'rotation = { axis = "z", rate = 20 }'
 
 
 class Short(Run):
