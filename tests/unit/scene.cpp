@@ -275,7 +275,7 @@ TEST_CASE("an unknown key gives file, line, table and the nearest key")
                 {"scene.toml, line 10", "[[part]] disc", "'densty'", "did you mean 'density'"});
   check_message(error_of(replaced(brake, "axis = \"z\"", "axes = \"z\""), {}), {"rotation", "'axes'", "'axis'"});
   check_message(error_of("fooooooooooooo = 1\n" + points, {}),
-                {"line 1", "known: title, fidelity, accuracy, gravity, mesh"});
+                {"line 1", "known: title, fidelity, accuracy, gravity, numbers, mesh"});
 }
 
 TEST_CASE("wrong types, signs and ranges are refused with key, value and what is expected")
