@@ -366,18 +366,20 @@ void Increment::by_smoothing(StickSlipState at)
   const double first = of.motion(q) / of.compliance, pairs = static_cast<double>(of.rho.size());
   Softening soft{first, 1 / of.compliance};
   VectorXd from = at.w;
+  const auto lacking = [&] { return rest(at, soft.spring, from); };
+  const auto is_close = [&]
+  { return soft.force > least * first && merit(at, soft.force, lacking()) < soft.force * soft.force * pairs; };
+  const auto sharpen = [&] { soft = {sharper * soft.force, sharper * soft.spring}; };
+  while (is_close()) sharpen(); // to where the start is no solution
   for (int iteration = 0; !ends_at(at, good) && iteration < most; ++iteration, ++best.iterations)
   {
-    const auto lacking = [&] { return rest(at, soft.spring, from); };
-    VectorXd now = lacking();
-    double size = merit(at, soft.force, now);
-    while (size < soft.force * soft.force * pairs && soft.force > least * first)
+    if (is_close()) // once a step: a corner much sharper than the last one is as hard as Coulomb's own
     {
-      soft = {sharper * soft.force, sharper * soft.spring};
+      sharpen();
       from = at.w;
-      now = lacking();
-      size = merit(at, soft.force, now);
     }
+    const VectorXd now = lacking();
+    const double size = merit(at, soft.force, now);
     const StickSlipState change = StatusSystem(of, friction, at, soft).change(now, soft);
     double part = 1;
     const auto lessens = [&]
