@@ -1,5 +1,5 @@
 # cpack -G DEB in the build folder makes squeal_VERSION_amd64.deb; tools/packaging/deb does it, and tries the package out.
-set(SQUEAL_CONTACT "squeal maintainers <squeal@packages.debian.org>" CACHE STRING "maintainer of the Debian package")
+set(SQUEAL_CONTACT "squeal maintainers <maintainers@squeal.example>" CACHE STRING "maintainer of the Debian package")
 set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON) # what is packaged is built; tests need not be
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME squeal)
