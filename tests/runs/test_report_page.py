@@ -159,7 +159,8 @@ for (const width of [1280, 390]) {
 
 
 def browse(profile, *words):
-    done = subprocess.run([BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--disable-background-networking",
+    """Without WebGL, which a processor draws too slowly for the suite: tests/evidence/page.py turns the view."""
+    done = subprocess.run([BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-3d-apis", "--hide-scrollbars", "--disable-background-networking",
                            f"--user-data-dir={profile}", *map(str, words)], capture_output=True, text=True, timeout=150)
     assert done.returncode == 0, done.stderr[-1000:]
     return done.stdout
