@@ -159,7 +159,9 @@ def test_where_no_cycle_of_the_pin_attracts_the_settled_motion_answers(converged
     assert (np.diff(time) > 0).all() and settled["periods"] == int(time[-1] / settled["period"] * (1 + 1e-9))
     # swings are within periods of the motion itself, whatever the search ended with: 1 %, as windows begin elsewhere
     base = settled["base_frequencies_hz"]
-    assert settled["period"] * base["first"] == pytest.approx(max(base["closes_after"], 1), rel=1e-9)
+    own = max(base["closes_after"], 1) / base["first"]
+    few = 16 * own > time[-1] - (settled["discarded"] % settled["periods"]) * settled["period"]
+    assert few or settled["period"] == pytest.approx(own, rel=1e-9)
     ends = np.searchsorted(time, np.arange(settled["discarded"] % settled["periods"], settled["periods"] + 1) * settled["period"])
     swings = [np.ptp(pin_moves[start:end]) for start, end in zip(ends, ends[1:])]
     assert settled["peak_to_peak"]["pin"]["mean"] == pytest.approx(np.mean(swings), rel=0.01)
