@@ -36,7 +36,7 @@ def test_an_installation_runs_and_plots_from_another_folder(tmp_path):
     assert (results / "report.json").exists()
     assert {"modes.png", "cycle.png"} <= {file.name for file in results.iterdir()}
     for tool in sorted((shared / "tools").iterdir()):
-        if tool.suffix or "python" not in tool.read_text().splitlines()[0]:
+        if tool.suffix or tool.is_dir() or "python" not in tool.read_text().splitlines()[0]:
             continue
         help_text = subprocess.run([tool, "--help"], cwd=work, env=environment, capture_output=True, text=True)
         assert help_text.returncode == 0, f"{tool.name}: {help_text.stderr[-2000:]}"
