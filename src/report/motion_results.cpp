@@ -295,7 +295,9 @@ void add_settled(Entry out, const Report& report)
   out.add("would_decide", "text", "of an undecided one: what would decide", motion.verdict.would_decide);
   out.show("periods", "-", "periods that were integrated", motion.periods());
   out.show("discarded", "-", "of these, before the motion was stationary", motion.discarded);
-  out.show("period", "s", "that of the strongest line, or its multiple that closes; the search's where fewer than 16 were seen", motion.period);
+  out.show("period", "s",
+           "that of the strongest line, or its multiple that closes; the search's where fewer than 16 were seen",
+           motion.period);
   out.add("steps_per_period", "-", "time steps of a period, rounded", settled.steps_per_period);
   out.mean("mean_energy", "J", "mean mechanical energy", settled.energy);
   out.mean("mean_fluctuating_energy", "J", "mean energy about equilibrium", settled.fluctuating_energy);
