@@ -23,7 +23,7 @@ WITH_VERDICT = [*LOSSY_PIN, "--set", "mesh.parameters.divisions=2"]
 PIN = [*WITH_VERDICT, "-cycle_multipliers", "0"]  # the verdict takes as long as the cycle, and longer on ranks
 FOUR_PAIRS = [*LOSSY_PIN, "--set", "mesh.parameters.divisions=1", "-cycle_multipliers", "0"]
 OF_THE_CLOCK = {"run", "timings", "processor_seconds", "exit_code", "memory_bytes"}
-OF_THE_WAY = {"attempts"}  # a run that goes on begins with the orbit of its checkpoint
+OF_THE_WAY = {"attempts", "next"}  # a run that goes on begins with the orbit of its checkpoint; the next command has its folder
 
 
 def start(output, *arguments, ranks=1, scene=OSCILLATOR, stdout=subprocess.PIPE):
