@@ -347,10 +347,9 @@ std::string make_complete(const Monodromy& monodromy, const SlowMotions& slow, I
     if (std::string refusal = make_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
     coverage = {true, ""}; // a multiplier above 1 needs no other
     if (repels(passes)) return {};
-    coverage = coverage_of(slow, {true});
-    if (!slow.without_known) return {};
-    const DeflatedSearch search =
-        search_beside(monodromy, beside_known(monodromy, slow, passes), {}, columns, largest_or_bounded);
+    DeflatedSearch search{true}; // an exact approximation lacks nothing
+    if (slow.without_known)
+      search = search_beside(monodromy, beside_known(monodromy, slow, passes), {}, columns, largest_or_bounded);
     searched += search.columns;
     coverage = coverage_of(slow, search);
     if (search.bounded || round == rounds) return {};
