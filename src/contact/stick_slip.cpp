@@ -216,16 +216,17 @@ StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction&
   const PairRows<Index> rows(of.directions);
   const bool whole = of.M.size() > 0;
   const PairStates states{of, friction, at, soft.force};
-  const VectorXd defects = states.defects();
-  particular_ = {-defects, -defects};
+  particular_ = {-at.r, VectorXd::Zero(at.r.size())};
   for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
   {
     const PairState state = states[pair];
     statuses_.push_back(state.status());
     const Index first = rows.normal(static_cast<Index>(pair));
     const Vector3d motion(1 / state.rho.normal, 1 / state.rho.tangential, 1 / state.rho.tangential); // of a unit force
-    laws_.push_back({state.projected().J, motion.asDiagonal() * (state.projected().J - Matrix3d::Identity())});
-    particular_.w.segment(first, own_).array() *= motion.head(own_).array();
+    const Projected to = state.projected();
+    laws_.push_back({to.J, motion.asDiagonal() * (to.J - Matrix3d::Identity())});
+    particular_.r.segment(first, own_) += to.p.head(own_);
+    particular_.w.segment(first, own_) = motion.head(own_).cwiseProduct(particular_.r.segment(first, own_));
     if (!whole && soft.force == 0 && statuses_.back() == ContactStatus::stick) continue;
     unknown_.push_back(pair);
     for (Index k = 0; k < own_; ++k) rows_.push_back(first + k);
@@ -325,7 +326,7 @@ struct Increment
   const VectorXd& q;
   StickSlipSolution best{}; // so far
 
-  /// What N w = q + M r lacks, with springs from another state on.
+  /// The rest of N w = q + M r, with springs from another state on.
   VectorXd rest(const StickSlipState& at, double spring, const VectorXd& from) const
   {
     return q - of.N * at.w + times_M(of, at.r - spring * (at.w - from));

@@ -62,8 +62,8 @@ struct StickSlipState
   Eigen::VectorXd r, w; // [N, m]
 };
 
-/// What makes a system of statuses regular on the way to a solution: laws with corners rounded off by a force [N], and
-/// springs across all rows [N/m].
+/// A regular system of statuses on the way to a solution: laws have corners rounded off by a force [N], and all rows
+/// springs [N/m].
 struct Softening
 {
   double force = 0, spring = 0;
