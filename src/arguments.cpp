@@ -13,11 +13,6 @@ namespace squeal
 namespace
 {
 
-bool is_scene_folder(const std::string& word)
-{
-  return is_file(std::filesystem::path(word) / scene_file);
-}
-
 /// A number of seconds above 0; otherwise sets the problem.
 void read_seconds(const std::string& word, const std::string& value, double& seconds, std::string& problem)
 {
@@ -112,6 +107,11 @@ std::string command_of(int argc, char** argv)
 }
 
 } // namespace
+
+bool is_scene_folder(const std::filesystem::path& folder)
+{
+  return is_file(folder / scene_file);
+}
 
 Arguments take_arguments(int& argc, char** argv)
 {

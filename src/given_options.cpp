@@ -1,5 +1,6 @@
 #include "squeal/given_options.hpp"
 
+#include "squeal/arguments.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/options.hpp"
 
@@ -151,7 +152,7 @@ std::string hint_of_scene(const std::string& word)
   std::error_code failed;
   for (const auto& folder : {name.parent_path(), std::filesystem::path("inputs")})
     for (const auto& entry : std::filesystem::directory_iterator(folder.empty() ? "." : folder, failed))
-      if (is_file(entry.path() / "scene.toml") || entry.path().extension() == ".toml")
+      if (is_scene_folder(entry.path()) || entry.path().extension() == ".toml")
         known.push_back(folder / entry.path().filename());
   const std::string under = (std::filesystem::path("inputs") / name).string();
   return std::ranges::find(known, under) == known.end() ? spelling_hint(name.string(), known)

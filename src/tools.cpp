@@ -1,6 +1,7 @@
 /// Tools as words of the program: "squeal plot RESULTS" runs tools/plot, of the sources or of the installation.
 #include "squeal/tools.hpp"
 
+#include "squeal/arguments.hpp"
 #include "squeal/base/error.hpp"
 
 #include <cerrno>
@@ -28,7 +29,7 @@ bool is_plain_word(const std::string& word)
 void become_tool(int argc, char** argv)
 {
   namespace fs = std::filesystem;
-  if (argc < 2 || !is_plain_word(argv[1]) || is_file(fs::path(argv[1]) / "scene.toml")) return;
+  if (argc < 2 || !is_plain_word(argv[1]) || is_scene_folder(argv[1])) return;
   std::error_code code;
   const fs::path program = fs::read_symlink("/proc/self/exe", code), prefix = program.parent_path().parent_path();
   for (const fs::path& folder : {prefix / "tools", prefix / "share/squeal/tools"})

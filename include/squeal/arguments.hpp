@@ -8,7 +8,7 @@ namespace squeal
 
 inline constexpr const char* scene_file = "scene.toml"; // of a scene that is a folder
 
-/// What the command line asks for.
+/// The requests of the command line.
 struct Arguments
 {
   std::filesystem::path scene, output;
@@ -21,6 +21,9 @@ struct Arguments
   bool options_in_variable = false; // PETSC_OPTIONS
   std::string problem;              // said after MPI is up, once
 };
+
+/// Whether a folder holds the file of a scene.
+bool is_scene_folder(const std::filesystem::path& folder);
 
 /// Takes squeal's own arguments out of argv; what stays is PETSc's.
 Arguments take_arguments(int& argc, char** argv);
