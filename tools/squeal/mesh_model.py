@@ -253,6 +253,11 @@ class Model:
                 self.notes.append(f"the tie of {tie[0]} (slave) and {tie[1]} (master): {bare[0]} has no faces")
                 self.ties.remove(tie)
 
+    def solids_and_faces(self, numbers):
+        """Numbers of the solids among elements, and nodes of the flat ones."""
+        return ([n for n in numbers if self.elements[n][0] in KINDS],
+                [self.elements[n][1] for n in numbers if self.elements[n][0] in FLAT])
+
     def add_parts_of_the_rest(self, name):
         """Solid elements without a part: a part a connected body."""
         taken = {number for part in self.parts.values() for number in part.elements}

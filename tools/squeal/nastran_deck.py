@@ -7,7 +7,7 @@ from collections import Counter
 from squeal import nastran_joining
 import numpy as np
 from squeal.deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes, number, sections_of, whole
-from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, corners_of
+from squeal.mesh_model import FLAT, MOTIONS, Model, corners_of
 from squeal.nastran_properties import note_shell_fields, read_materials, read_properties
 
 ELEMENTS = {("CHEXA", 8): "hex8", ("CHEXA", 20): "hex20", ("CPENTA", 6): "wedge6", ("CTETRA", 4): "tet4",
@@ -319,8 +319,7 @@ def add_set(model, name, items, kind):
             model.node_sets.setdefault(name, []).extend(known)
     elif kind.startswith("ELEM"):
         known = [n for n in items if n in model.elements]
-        solids = [n for n in known if model.elements[n][0] in KINDS]
-        flat = [model.elements[n][1] for n in known if model.elements[n][0] in FLAT]
+        solids, flat = model.solids_and_faces(known)
         if solids:
             model.element_sets.setdefault(name, []).extend(solids)
         if flat:

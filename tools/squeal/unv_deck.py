@@ -129,8 +129,7 @@ def add_group(model, name, entities):
     lost = len(entities) - len(nodes) - len(elements)
     if lost:
         model.notes.append(f"{lost} of the {len(entities)} entities of {name}, which are no nodes and no elements of the mesh")
-    solids = [n for n in elements if model.elements[n][0] in KINDS]
-    flat = [model.elements[n][1] for n in elements if model.elements[n][0] in FLAT]
+    solids, flat = model.solids_and_faces(elements)
     if nodes:
         model.node_sets.setdefault(name, []).extend(nodes)
     if flat:
