@@ -213,9 +213,8 @@ std::string brief_values(const Result& group, const std::string& place)
     const std::string name = place + label(part.name), unit = unit_text(part);
     if (part.kind == Kind::group) add(brief_values(part, name + " "));
     if (!part.is_brief) continue;
-    const bool is_word = part.unit == "text" || part.unit == "word";
     if (const std::string value = value_text(part.value, part, 5); !value.empty())
-      add((is_word ? "" : name + " ") + value + (unit.empty() ? "" : " " + unit));
+      add((part.value.is_string() ? "" : name + " ") + value + (unit.empty() ? "" : " " + unit));
   }
   return text;
 }

@@ -56,8 +56,8 @@ struct Completeness
 /// How an orbit lost its stability by this multiplier.
 Crossing crossing_of(std::complex<double> multiplier);
 
-/// What a grid of time may move this multiplier by for that of the shift in time misses 1: as along the orbit, it moves
-/// any motion that nothing else moves, as the phase between parts that do not know of each other. 0 of one that turns.
+/// The move of this multiplier by a grid of time, as the shift's own misses 1: a grid moves any motion that nothing
+/// else moves, as the phase between parts that do not know of each other. 0 of one that turns.
 double moved_by_grid(const Multipliers& multipliers, std::complex<double> value);
 
 /// Says what the bars allow.

@@ -69,7 +69,7 @@ std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const Eigen
 /// of twice as many steps, which is the error of a step of order 2. A contact that hits a mass moves it within a step
 /// by what the grid allows, and a grid with a whole number of steps a period places each impact at one point of its
 /// step. So the bars hold as well what changes along eight periods in 8 N + 1 steps, which place it at eight points.
-/// Those of real multipliers hold by how much that of the shift in time misses 1 on either grid.
+/// Bars of real multipliers hold by how much that of the shift in time misses 1 on either grid.
 FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
 {
   FloquetAnalysis result;

@@ -328,7 +328,7 @@ void compare(const std::vector<Complex>& reduced, const std::vector<Complex>& fu
 }
 
 /// Does work(k) for this rank's share of so many results, between requests to end, and gives every rank all results.
-/// What fails has its reason. Collective.
+/// Results that failed have their reason. Collective.
 template <class Result, class Work>
 void find_all(std::vector<Result>& results, const char* what, MPI_Comm comm, Work work)
 {

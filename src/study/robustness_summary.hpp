@@ -23,7 +23,7 @@ struct SampleResult
   std::string problem{}; // empty: it is known
 };
 
-/// The same of a check.
+/// A check, or why there is none.
 struct CheckResult
 {
   RobustCheck check{};

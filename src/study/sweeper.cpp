@@ -204,7 +204,7 @@ private:
     take_over(before, now, matches);
   }
 
-  /// Of the first point in the other direction of rotation, by the eigenvalues: friction is weak there.
+  /// Takes numbers from the first point in the other direction, by the eigenvalues: friction is weak there.
   static void take_numbers(const Followed& other, Followed& now)
   {
     const std::vector<int> partners = nearest_partners(eigenvalues(other), eigenvalues(now));

@@ -38,7 +38,7 @@ struct MotionVerdict
   std::string between, would_decide; // of an undecided one, in words
 };
 
-/// What is seen of a motion at equal steps.
+/// A motion as it is seen at equal steps.
 struct MotionSeries
 {
   std::vector<std::vector<double>> averaged; // whose means over periods count; by the first stationarity is judged
