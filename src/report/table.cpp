@@ -264,16 +264,17 @@ std::string brief_stage(const Result& stage)
   return (row.empty() ? "" : stage_row(stage.name, row)) + lists;
 }
 
-/// Counts the checks of a tree, and names those that did not pass.
+/// Counts the checks of a tree that were made, and names those that did not pass.
 void count_checks(const Result& group, const std::string& place, int& passed, std::vector<std::string>& failed)
 {
   for (const Result& part : group.parts)
   {
     const std::string name = place + label(part.name);
     count_checks(part, part.kind == Kind::group ? name + " " : place, passed, failed);
-    if (!part.passed) continue;
+    const std::string value = part.passed ? value_text(part.value, part, 5) : "";
+    if (value.empty()) continue;
     passed += *part.passed;
-    if (!*part.passed) failed.push_back(name + " " + value_text(part.value, part, 5));
+    if (!*part.passed) failed.push_back(name + " " + value);
   }
 }
 
