@@ -211,11 +211,17 @@ std::set<Effect> NearbyModels::changes(const Known& known, const Values& values)
 {
   if (!known.values) return {Effect::mesh};
   std::set<Effect> changed;
+  // A number that does not say what it changes may change everything.
+  const auto effect_of = [&](const std::string& key)
+  {
+    const Effect effect = description_of(scene_, key).effect;
+    return effect == Effect::nothing ? Effect::mesh : effect;
+  };
   const auto compare = [&](const Values& these, const Values& others)
   {
     for (const auto& [key, value] : these)
       if (const auto other = others.find(key); other == others.end() || other->second != value)
-        changed.insert(description_of(scene_, key).effect);
+        changed.insert(effect_of(key));
   };
   compare(values, *known.values);
   compare(*known.values, values);

@@ -27,7 +27,7 @@ SceneKeys keys_of(Coupling& c)
       {"name", &c.name, "text", "name for springs, connectors, forces and probes", required},
       {"on", &c.on, "texts", "a named group, or a list of them, whose nodes it follows", required},
       {"at", &c.at, "m", "reference point", required, mesh},
-      {"weights", &c.weights, "-", "of each node in the mean, one a group; 1 when absent", positive},
+      {"weights", &c.weights, "-", "of each node in the mean, one a group; 1 when absent", positive, mesh},
       {"mass", &c.mass, "kg", "mass at the reference point", not_negative, mass},
       {"inertia", &c.inertia, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about the reference point", mass,
        Rule::inertia},

@@ -110,6 +110,29 @@ TEST_CASE("a number makes anew the parts that it enters alone, whatever number w
   }
 }
 
+TEST_CASE("weights of a coupling make its rows anew")
+{
+  Scene scene = two_points();
+  scene.points.push_back({"side", {0.1, 0, 0.1}, 3, {true, true, true, false, false, false}});
+  scene.springs.push_back({"side", ground, {1, 0, 0}, 1e5, 0});
+  scene.springs.push_back({"side", ground, {0, 1, 0}, 1e5, 0});
+  scene.springs.push_back({"side", ground, {0, 0, 1}, 1e5, 0});
+  Coupling& mean = scene.couplings.emplace_back();
+  mean.name = "mean";
+  mean.on = {"tip", "disc", "side"};
+  mean.at = {0, 0, 0.05};
+  mean.weights = {1, 1, 1};
+  mean.mass = 4;
+  mean.inertia = {1, 1, 1};
+  const Model model = build_model(scene, PETSC_COMM_WORLD);
+  NearbyModels models(model, scene, PETSC_COMM_WORLD);
+  for (const double weight : {3., 5.})
+  {
+    const SceneNumber number{"coupling.mean.weights.0", weight};
+    check_model(models.at({&number, 1}), scene, {number});
+  }
+}
+
 TEST_CASE("on a grid of a stiffness and the friction coefficient the matrices are made once a stiffness")
 {
   Scene scene = two_points();
