@@ -21,7 +21,7 @@ def pyvista():
         import pyvista as module
         from vtkmodules.vtkCommonCore import vtkLogger
     except ImportError:
-        raise Missing("3D pictures need PyVista, which tools/setup puts into the build folder") from None
+        raise Missing("3D pictures need PyVista: pip install pyvista, which tools/setup does in a clone") from None
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # it warns of a display that is not needed
     module.OFF_SCREEN = True
     return module
