@@ -49,7 +49,7 @@ const std::array known_arguments = {
              [](Arguments& arguments, const std::string&) { arguments.length = TableLength::full; }},
     Argument{"--version", nullptr, "versions of squeal and of the libraries it runs on",
              [](Arguments& arguments, const std::string&) { arguments.version = true; }},
-    Argument{"--help", nullptr, "this text; -help and -h as well",
+    Argument{"--help", nullptr, "this text; -help and -h as well; --help mesh: the keys of [mesh], or of another table",
              [](Arguments& arguments, const std::string&) { arguments.help = true; }},
     Argument{"--reference", "PAGE", "keys or results: the page of all keys, options and arguments, or of all results",
              [](Arguments& arguments, const std::string& value)
@@ -124,7 +124,11 @@ Arguments take_arguments(int& argc, char** argv)
     const std::string given = argv[i], word = long_form(given);
     const auto known = std::ranges::find_if(known_arguments, [&](const Argument& one) { return word == one.name; });
     if (known != known_arguments.end() && !known->value)
+    {
       known->take(arguments, {});
+      if (arguments.help && arguments.section.empty() && i + 1 < argc && argv[i + 1][0] != '-')
+        arguments.section = argv[++i];
+    }
     else if (known != known_arguments.end() && i + 1 < argc)
       known->take(arguments, argv[++i]);
     else if (known != known_arguments.end())

@@ -165,9 +165,9 @@ void examine(GivenOptions& given)
   for (std::size_t i = 0; i < words.size(); ++i)
   {
     if (!is_option(words[i]))
-      throw Error("unexpected argument '" + shortened(words[i]) +
+      throw Error((is_scene_folder(words[i]) ? "a second scene '" : "there is no scene '") + shortened(words[i]) +
                   "': a scene is one file that ends in .toml, or a folder that holds a scene.toml" +
-                  hint_of_scene(words[i]));
+                  (is_scene_folder(words[i]) ? "; a run takes one" : hint_of_scene(words[i])));
     const bool has_value = i + 1 < words.size() && !is_option(words[i + 1]);
     const std::string name = words[i].substr(1), value = has_value ? words[++i] : "";
     if (const std::string problem = problem_of_option(name, value); !problem.empty()) throw Error(problem);

@@ -65,13 +65,31 @@ void print_help()
               "  SCENE             a scene file (.toml), or a folder that holds a scene.toml\n"
               "%s"
               "  exit code: 0 all converged, 2 a stage did not (the report says which), 3 asked to end, 1 an error\n\n"
-              "Keys of a scene file: squeal --reference keys\n\n"
+              "  squeal run|plot|report|mesh|matrices|sound|uff|chart|convergence …: the tools; each explains itself "
+              "by --help\n\n"
+              "Keys of a scene file: squeal --reference keys, or of a table, squeal --help contact\n\n"
               "Algorithm options (PETSc options database) [default]\n%s\n"
               "Options of the solvers themselves, PETSc's, SLEPc's and MUMPS's, follow the prefixes\n %s\n"
               "e.g. -cycle_snes_monitor, -modes_pep_monitor, -factor_mat_mumps_icntl_14 50.\n\n"
               "Options of the whole run, PETSc's:\n%s",
               SQUEAL_VERSION, argument_reference().c_str(), option_reference().c_str(), prefixes.c_str(),
               session_option_reference().c_str());
+}
+
+/// The keys of a table, as the page of keys has them. Returns whether there is such a table.
+bool print_section(const std::string& name)
+{
+  const std::string page = scene_reference();
+  for (const std::string& head : {"[" + name + "]", "[[" + name + "]]", name, name + " = { … }"})
+    if (const std::size_t begin = page.find("### `" + head + "`"); begin != std::string::npos)
+    {
+      const std::size_t end = page.find("\n### ", begin);
+      std::printf("%s\n", page.substr(begin + 4, end == std::string::npos ? end : end - begin - 4).c_str());
+      return true;
+    }
+  std::fprintf(stderr, "squeal: error: --help %s: no such table; squeal --reference keys lists them\n",
+               shortened(name).c_str());
+  return false;
 }
 
 /// The page inputs/KEYS.md.
@@ -257,6 +275,7 @@ int main(int argc, char** argv)
   Session session(argc, argv, nullptr);
   end_with_launcher();
   const int rank = rank_of(PETSC_COMM_WORLD);
+  if (arguments.help && !arguments.section.empty()) return rank != 0 || print_section(arguments.section) ? 0 : 1;
   if (arguments.help || arguments.version || !arguments.reference.empty())
   {
     if (rank == 0)

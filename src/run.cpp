@@ -83,7 +83,7 @@ void print_end(const Report& report, const ResultsFolder& results, MPI_Comm comm
   if (report.ended_by.empty())
     std::printf("results are in %s\n", results.place().c_str());
   else
-    std::printf("ended %s: results so far are in %s; the same command with --restart goes on from there\n",
+    std::printf("ended %s: results so far are in %s; the same command with --restart goes on from the last checkpoint\n",
                 report.ended_by.c_str(), results.place().c_str());
 }
 

@@ -45,6 +45,20 @@ void warn_of_rates(const Model& model, const Scene& scene, std::vector<std::stri
   }
 }
 
+/// Whether a drive moves a pair along its surface, by more than the rounding of one along the normal.
+bool is_driven(const Interface& interface, const Scene& scene)
+{
+  constexpr double rounding = 1e-9;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(interface.pairs); ++i)
+  {
+    const ContactPair* const pair = interface.geometry.empty() ? nullptr : &interface.geometry[i];
+    const Vec3 velocity =
+        pair ? drive_velocity(scene.contacts[static_cast<std::size_t>(pair->contact)], pair->position) : Vec3{};
+    if (drive_speed(interface, i) > rounding * norm(velocity)) return true;
+  }
+  return false;
+}
+
 /// A sentence for each contact whose drive is not along its surface.
 void warn_of_drives(const Interface& interface, const Scene& scene, std::vector<std::string>& sentences)
 {
@@ -142,6 +156,7 @@ ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm)
   const auto look = [&]
   {
     summary.warnings = warnings_of(model, scene);
+    summary.slides = is_driven(model.interface, scene);
     summary.size = size_of(model.mesh);
     summary.length = std::ranges::max(summary.size);
     summary.parts = masses_of(model.mesh, scene);

@@ -14,6 +14,7 @@ struct Arguments
   std::filesystem::path scene, output;
   std::vector<std::string> overrides;
   RunLimits limits;
+  std::string section;          // of the keys that --help shows; empty: all of the help
   std::string program, command; // as a shell takes them; the command begins with the program
   TableLength length{};
   bool restart = false, dry_run = false, help = false, version = false, allow_scripts = false, force = false;

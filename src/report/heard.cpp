@@ -211,15 +211,27 @@ std::string beside_rest(const Report& report)
                        { return motion.kind == ReachedKind::steady || motion.kind == ReachedKind::varying; });
 }
 
+/// Why friction cannot feed a motion; empty: it may.
+std::string without_friction(const Report& report)
+{
+  const Equilibrium& found = report.point.equilibrium;
+  const std::vector<double> forces = closed_reactions(found);
+  if (report.model.pairs == 0) return "no contact: nothing is there that friction could feed";
+  if (forces.empty()) return "nothing touches: no contact pair is closed, and friction does nothing";
+  if (std::ranges::none_of(forces, [](double force) { return force > 0; }))
+    return "nothing presses: the contact carries no force, and what its friction does is unknown";
+  if (!report.model.slides && report.point.modes.unstable_count == 0)
+    return "nothing slides: no drive moves a contact along its surface; no mode grows in the band";
+  return {};
+}
+
 /// Without a cycle.
 std::string linear_text(const Report& report)
 {
   if (report.point.equilibrium.outcome.kind != OutcomeKind::converged)
     return "nothing is known: no equilibrium was found";
   if (!has_run(report.point.modes.outcome)) return "nothing is known: the modes were not computed";
-  const bool touches = std::ranges::count(report.point.equilibrium.closed, 1) > 0;
-  if (report.point.modes.unstable_count == 0 && report.model.pairs > 0 && !touches)
-    return "nothing touches: no contact pair is closed, and friction does nothing";
+  if (const std::string text = without_friction(report); !text.empty()) return text;
   if (report.point.modes.unstable_count == 0)
     return report.point.modes.outcome.kind == OutcomeKind::converged
                ? "silent: no mode grows in the band" + beside_rest(report)
@@ -237,10 +249,9 @@ std::string options_to_go_on(const Report& report, const Scene& scene)
   const Modes& modes = report.point.modes;
   const bool has_motion = cycle == OutcomeKind::converged || has_run(report.motion.settled.outcome);
   const bool has_study = scene.sweep || scene.sensitivity || scene.robustness || scene.response || scene.branch;
-  if (!report.ended_by.empty()) return " --restart";
-  if (equilibrium == OutcomeKind::no_equilibrium)
+  if (equilibrium != OutcomeKind::converged)
     return format(" --set friction.coefficient=%g", scene.friction.coefficient / 2);
-  if (equilibrium != OutcomeKind::converged) return " --verbose";
+  if (has_run(modes.outcome) && !without_friction(report).empty()) return {};
   if (modes.outcome.kind == OutcomeKind::not_converged) return " -modes_solver toar";
   if (has_motion && report.motion.cycle.multipliers.stability == Stability::undecided)
     return " -cycle_watched_periods 200";
@@ -257,6 +268,8 @@ std::string options_to_go_on(const Report& report, const Scene& scene)
 
 std::string next_command(const Report& report, const Scene& scene)
 {
+  if (!report.ended_by.empty())
+    return report.command + (report.command.find(" --restart") == std::string::npos ? " --restart" : "");
   const std::string options = options_to_go_on(report, scene);
   return options.empty() ? report.program + " report " + report.place.string() : report.command + options;
 }

@@ -10,16 +10,6 @@ namespace squeal
 namespace
 {
 
-/// Normal reactions of the closed pairs [N].
-std::vector<double> closed_reactions(const Equilibrium& equilibrium)
-{
-  std::vector<double> forces;
-  const PairView reactions(equilibrium.reactions, equilibrium.directions);
-  for (std::size_t i = 0; i < reactions.pairs(); ++i)
-    if (equilibrium.closed[i]) forces.push_back(reactions.normal(i));
-  return forces;
-}
-
 void add_contact(Entry out, const Contact& contact, const ContactResultant& resultant)
 {
   out.brief("stator", "text", "the contact's stator", contact.stator);
@@ -77,12 +67,11 @@ const char* count_remedy(const Modes& modes)
 void warn_of_modes(Entry out, const Modes& modes, const ModelSummary& model)
 {
   if (modes.modes.empty() && modes.outcome.kind == OutcomeKind::converged)
-    out.warn(Severity::severe,
-             format("no mode lies below %g Hz", modes.band) +
-                 (model.length > 0
-                      ? format(": is mesh.scale right (the model is %.3g m long), and are moduli and densities?",
-                               model.length)
-                      : ": is modes.band right, and are the units of M and K?"));
+    out.warn(Severity::severe, format("no mode lies below %g Hz", modes.band) +
+                                   (model.length > 0 ? format(": raise modes.band, or is mesh.scale wrong (the model "
+                                                              "is %.3g m long), or a modulus or density?",
+                                                              model.length)
+                                                     : ": is modes.band right, and are the units of M and K?"));
   if (model.rounding_hz > 0.001 * modes.band)
     out.warn(Severity::warning,
              format("modes below %.3g Hz are lost in rounding beside the stiffest entry of K: make what is rigid "
@@ -106,6 +95,15 @@ void warn_of_modes(Entry out, const Modes& modes, const ModelSummary& model)
 }
 
 } // namespace
+
+std::vector<double> closed_reactions(const Equilibrium& equilibrium)
+{
+  std::vector<double> forces;
+  const PairView reactions(equilibrium.reactions, equilibrium.directions);
+  for (std::size_t i = 0; i < reactions.pairs(); ++i)
+    if (equilibrium.closed[i]) forces.push_back(reactions.normal(i));
+  return forces;
+}
 
 void add_probes(Entry out, const std::string& name, const char* meaning, const std::vector<double>& values)
 {
@@ -131,7 +129,8 @@ void add_equilibrium(Entry whole, const Report& report)
   const bool is_found = found.outcome.kind == OutcomeKind::converged;
   out.check(is_found, "residual", "-", "largest natural map of a pair over the largest reaction",
             found.outcome.residual);
-  out.check(is_found, "force_residual", "-", "norm of K u - F - B' r over the norm of F", found.force_residual);
+  out.check(is_found, "force_residual", "-", "norm of K u - F - B' r over the norm of F; null without an equilibrium",
+            is_found ? found.force_residual : std::nan(""));
   (found.auxiliary_stiffness > 0 ? out : out.hidden())
       .show("auxiliary_stiffness", "N/m", "springs across pairs that alone hold a body; 0: none",
             found.auxiliary_stiffness);
@@ -152,6 +151,8 @@ void add_equilibrium(Entry whole, const Report& report)
     out.warn(Severity::severe,
              "no contact pair is closed: nothing touches, and friction does nothing. Is the gap too large, or does a "
              "load pull the bodies apart?");
+  if (!forces.empty() && found.outcome.kind == OutcomeKind::converged && !(*greatest > 0))
+    out.warn(Severity::severe, "no load presses the contact: give a [[force]] or a [[pressure]]");
 }
 
 void add_modes(Entry out, const Report& report)

@@ -48,18 +48,22 @@ DesignTable read_design_table(const std::filesystem::path& file)
   for (std::string line; std::getline(stream, line);)
   {
     const std::string place = file.string() + ", line " + std::to_string(++number);
+    if (constexpr const char* mark = "\xEF\xBB\xBF"; number == 1 && line.starts_with(mark)) line.erase(0, 3); // UTF-8's
     const std::vector<std::string> cells = cells_of(line);
     if (cells.empty() || cells == std::vector<std::string>{""} || cells.front().starts_with('#')) continue;
     if (table.keys.empty())
     {
       table.keys = cells;
+      if (cells.size() == 1 && cells[0].find(';') != std::string::npos)
+        throw Error(place + ": '" + shortened(cells[0]) +
+                    "' has semicolons: put commas between the keys, and points in numbers");
       for (const std::string& key : cells)
         if (std::ranges::count(cells, key) > 1) throw Error(place + ": the key '" + key + "' is there twice");
       continue;
     }
     if (cells.size() != table.keys.size())
       throw Error(place + ": " + std::to_string(cells.size()) + " values for " + std::to_string(table.keys.size()) +
-                  " keys: give one each");
+                  " keys: give one each, with a comma between them");
     std::vector<double>& point = table.points.emplace_back();
     for (std::size_t i = 0; i < cells.size(); ++i) point.push_back(number_in(cells[i], place, table.keys[i]));
   }

@@ -108,8 +108,26 @@ private:
     if (holds_numbers(key) && put_names(copy, path))
       read_value({key, label, folder_, place_of(node)}, *copy.get(0));
     else
-      read_value({key, label, folder_}, node);
+      read_own(key, node, label);
     if (const void* const member = member_of(key.target)) places_.given[member] = place_of(node);
+  }
+
+  /// A value that names no number.
+  void read_own(const SceneKey& key, const toml::node& node, const std::string& label) const
+  {
+    try
+    {
+      read_value({key, label, folder_}, node);
+    }
+    catch (const Error& error)
+    {
+      const auto text = node.value_exact<std::string>();
+      if (!text || !holds_numbers(key) || scene_.numbers.empty()) throw;
+      std::vector<std::string> names;
+      for (const auto& [name, value] : scene_.numbers) names.push_back(name);
+      throw Error(error.what() + std::string("; no number of [numbers] has that name") +
+                  hint_or_list(text->substr(text->starts_with('-') ? 1 : 0), names));
+    }
   }
 
   /// Puts named numbers into a list of one value.

@@ -182,3 +182,39 @@ def test_a_warning_that_the_motion_settles_disappears(converged):
     found = converged(*given, ranks=1).report
     assert found["cycle"]["outcome"] == "converged"
     assert "warnings" not in found["estimate"] and json.dumps(alone).count("first lift-off") <= 1
+
+
+NEVER_SILENT = {
+    "no contact": (r"^\[\[contact\]\].*?(?=^\[)", "", "no contact"),
+    "no load": (r"^\[\[force\]\].*?(?=^\[)", "", "nothing presses"),
+    "along its normal": (r"rotation = \{.*?\}", "velocity = [0, 0, 1]", "nothing slides"),
+}
+
+
+@pytest.mark.parametrize("name", NEVER_SILENT)
+def test_silence_is_not_said_where_friction_feeds_nothing(converged, tmp_path, name):
+    part, instead, words = NEVER_SILENT[name]
+    scene = pin_scene(tmp_path)
+    scene.write_text(re.sub(part, instead, scene.read_text(), flags=re.M | re.S))
+    report = converged(scene, ranks=1).report
+    assert report["heard"].startswith(words) and " report " in report["next"]
+
+
+def test_a_table_of_a_spreadsheet_is_read_or_its_form_is_told(converged, squeal, tmp_path):
+    rows = "friction.coefficient,force.0.vector.2\r\n0.1,-100\r\n0.3,-90\r\n"
+    (tmp_path / "points.csv").write_bytes(b"\xef\xbb\xbf" + rows.encode())
+    scene = pin_scene(tmp_path, more='[sweep]\ntable = "points.csv"\n')
+    assert len(converged(scene, ranks=1).report["sweep"]["points"]) == 2
+    (tmp_path / "points.csv").write_text(rows.replace(",", ";"))
+    assert "points.csv, line 1: " in squeal(scene, "--dry-run", ranks=1).messages[0]
+
+
+def test_help_shows_the_keys_of_a_table(squeal):
+    assert squeal("--help", "rotor", ranks=1).printed.startswith("`[[rotor]]`: ")
+    unknown = squeal("--help", "roter", ranks=1)
+    assert unknown.code == 1 and "--help roter: no such table" in unknown.errors
+
+
+def test_a_name_that_is_no_number_of_the_scene_is_told_with_the_nearest(squeal, tmp_path):
+    scene = pin_scene(tmp_path, ("[0, 0, -100]", '[0, 0, "-clamp"]'), more="[numbers]\nclampp = 100\n")
+    assert "no number of [numbers] has that name; did you mean 'clampp'?" in squeal(scene, "--dry-run", ranks=1).messages[0]

@@ -46,7 +46,7 @@ def test_a_band_without_modes_is_warned_of_with_the_length_of_the_model(converge
     scene = brick_scene(tmp_path)
     assert "no mode lies below" not in converged(scene, ranks=1).printed
     run = converged(scene, "--set", "mesh.scale=1e-3", ranks=1)
-    assert "no mode lies below 5000 Hz: is mesh.scale right (the model is 0.0003 m long)" in run.printed
+    assert "no mode lies below 5000 Hz: raise modes.band, or is mesh.scale wrong (the model is 0.0003 m long)" in run.printed
     assert "WARNING: the model is 0.0003 m long" in run.printed
     assert ElementTree.parse(run.output / "fields.xdmf").getroot().get("Version").split(".")[0] == "3"  # meshio reads no other
 

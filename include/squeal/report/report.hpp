@@ -35,6 +35,7 @@ struct ModelSummary
   PetscInt dofs = 0;
   long elements = 0;
   int pairs = 0, ranks = 1;
+  bool slides = false;     // a drive moves a contact along its surface
   double memory_bytes = 0; // largest resident size so far, all ranks together
   double length = 0;       // [m] of the longest side of the box around the mesh; 0 on a matrix scene
   Vec3 size{};             // [m] of that box
@@ -102,6 +103,9 @@ struct Report
 
 /// The estimate of the followed mode.
 const Estimate& followed_estimate(const Report& report);
+
+/// Normal reactions of the closed pairs [N].
+std::vector<double> closed_reactions(const Equilibrium& equilibrium);
 
 /// The outcome of every stage but the model, in the order in which they run.
 std::array<std::pair<Stage, Outcome>, 13> outcomes_of(const Report& report);

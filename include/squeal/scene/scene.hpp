@@ -1,7 +1,7 @@
 #pragma once
 /// A scene: everything physical that a run needs, as plain data in SI units. Sources of this header are scene.cpp (from
 /// a file), write.cpp (to text), check.cpp (contradictions) and doubts.cpp (possible values that are hardly meant).
-/// This room includes neither PETSc nor MPI. Algorithms are chosen by PETSc options, with one prefix for each stage.
+/// Algorithms are chosen by PETSc options, with one prefix for each stage.
 #include "squeal/scene/model_parts.hpp"
 
 #include <span>
