@@ -232,8 +232,7 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)
     add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient));
-  const bool as_full = scene.fidelity == CycleModel::automatic && scene.cycle.start.kind == CycleStartKind::coarse;
-  const double cycle = memory_of_cycle(sizes, as_full ? CycleModel::full : scene.fidelity, in_factor, free);
+  const double cycle = memory_of_cycle(sizes, scene.fidelity, in_factor, free);
   if (scene.cycle.enabled) add(Stage::cycle, cycle);
   if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)) + (motions_of(scene) > 0 ? cycle : 0));
   if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));

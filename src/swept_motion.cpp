@@ -1,6 +1,5 @@
 #include "squeal/swept_motion.hpp"
 
-#include "squeal/coarse.hpp"
 #include "squeal/find_motion.hpp"
 #include "squeal/report/report.hpp"
 
@@ -79,8 +78,7 @@ SweptMotion find_swept_motion(NearbyModels& models, const Scene& scene, const Pr
   const SlidingPoint& point = report.point = find_point(there, at, options, run);
   report.transient = run_stage(run, Stage::transient, why_off(Stage::transient, point, at),
                                [&] { return find_transient(point, at, options); });
-  if (const auto coarse = coarse_model_of(at, there)) report.coarse = find_coarse_start(*coarse, point, at, options);
-  report.motion = find_motion(point, motion_start(point, at, report.transient, report.coarse), at, options, run);
+  report.motion = find_motion(point, motion_start(point, at, report.transient), at, options, run);
   return motion_of(report, at);
 }
 

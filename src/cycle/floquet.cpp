@@ -172,21 +172,20 @@ int eliminated_motions(const CycleProblem& problem, const RecordedPeriods& perio
   return motions;
 }
 
-/// Why a model of so many shapes is not made; empty: it takes no more than `part` of the free memory.
-std::string lack_of_memory(const Structure& structure, Index shapes, double part)
+/// Why a model of so many shapes is not made; empty: it fits the free memory.
+std::string lack_of_memory(const Structure& structure, Index shapes)
 {
   PetscInt dofs = 0;
   check(VecGetSize(structure.load, &dofs));
   const double needed = memory_of_reduction(dofs, static_cast<double>(shapes)),
                free = free_memory(comm_of(structure.load));
-  if (needed <= part * free) return {};
+  if (needed <= free) return {};
   return format("a reduced model of %ld shapes takes %.3g GB, and %.3g GB are free: a larger machine would decide",
                 static_cast<long>(shapes), 1e-9 * needed, 1e-9 * free);
 }
 
-/// The reduced model for the recorded periods; null where it does not fit this part of the free memory, with the
-/// reason.
-std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const RecordedPeriods& periods, double part,
+/// The reduced model for the recorded periods; null where it does not fit the free memory, with the reason.
+std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const RecordedPeriods& periods,
                                               std::string& missing)
 {
   const Interface& interface = problem.sliding.interface;
@@ -206,7 +205,7 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   const std::size_t forces =
       std::min(follow ? roles.active.size() : rows, static_cast<std::size_t>(attachments_on_recorded_contact));
   missing = lack_of_memory(problem.sliding.structure,
-                           static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces), part);
+                           static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces));
   if (!missing.empty()) return nullptr;
   constexpr double highest = 0.25; // of the modes: what they change says what those beyond them may
   auto model = std::make_shared<ReducedModel>(
@@ -262,7 +261,7 @@ SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, int 
   const RecordedPeriods periods = record_periods(map, other_steps, period, start);
   SlowMotions none;
   none.periods = other_steps > 0 ? 3 : 2;
-  const auto model = model_for(problem, periods, 1, none.missing);
+  const auto model = model_for(problem, periods, none.missing);
   if (!model) return none;
   const auto contacts = [&](int which)
   {
@@ -301,23 +300,6 @@ void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_ste
 {
   flow.slow_motions = [&problem, &map, other_steps](double period, Vec start)
   { return slow_motions_along(problem, map, other_steps, period, start); };
-}
-
-Preconditioner recorded_preconditioner(const CycleProblem& problem, const PeriodMap& map, double period, Vec rate)
-{
-  const auto& [structure, interface, equilibrium] = problem.sliding;
-  RecordedPeriods periods;
-  periods.records[RecordedPeriods::own] = contact_of(map.records);
-  std::string missing;
-  const auto model = model_for(problem, periods, memory_for_shapes(1), missing); // it is kept while shooting
-  if (!model) return {};
-  ReducedMap reduced{*model, map.steps, map.theta, comm_of(structure.load)};
-  const auto contacts = recorded_contacts(*model, interface.directions, periods.records[RecordedPeriods::own]);
-  const MatrixXd columns = monodromy(reduced, period, contacts);
-  const auto correction = std::make_shared<const MonodromyCorrection>(
-      monodromy_correction(*model, columns, coordinates(*model, structure, displacement(rate), velocity(rate))));
-  return [model, correction, apply = preconditioner_of(*correction, coordinates_in(*model, structure))](
-             double T, Vec x, Vec y) { apply(T, x, y); };
 }
 
 int steps_to_compare(const Structure& structure, int steps)

@@ -10,11 +10,6 @@ namespace squeal
 /// compared. Borrows problem, options and map.
 void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_steps, Flow& flow);
 
-/// The preconditioner of the reduced model (section 7.6) on the contact of the period that the map recorded last;
-/// `rate` is its dPhi/dT. Empty where that model would take more than half of the free memory. Borrows the problem.
-/// Error: as of reduce.
-Preconditioner recorded_preconditioner(const CycleProblem& problem, const PeriodMap& map, double period, Vec rate);
-
 /// The number of steps a period that tells the error of another: twice as many of few where periods are dear and no
 /// verdict at finer steps follows, else 0. Collective.
 int steps_to_compare(const Structure& structure, int steps);

@@ -1,6 +1,6 @@
 /// Newton's method on x(xi) = p; on shells on the least distance, which leaves p's part along the normal. The excess is
 /// how far xi leaves the element in units of half its width; on a shell the distance from its surface counts as well.
-#include "squeal/mesh/location.hpp"
+#include "location.hpp"
 
 #include "squeal/mesh/shapes.hpp"
 

@@ -1,8 +1,8 @@
 #include "squeal/mesh/ties.hpp"
 
 #include "dual_rows.hpp"
+#include "location.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/mesh/location.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>

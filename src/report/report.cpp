@@ -47,14 +47,13 @@ const Estimate& followed_estimate(const Report& report)
   return report.point.estimates.empty() ? none : report.point.estimates.front();
 }
 
-std::array<std::pair<Stage, Outcome>, 13> outcomes_of(const Report& report)
+std::array<std::pair<Stage, Outcome>, 12> outcomes_of(const Report& report)
 {
   return {{{Stage::equilibrium, report.point.equilibrium.outcome},
            {Stage::modes, report.point.modes.outcome},
            {Stage::estimate, followed_estimate(report).outcome},
            {Stage::response, report.response.outcome},
            {Stage::transient, report.transient.outcome},
-           {Stage::coarse, report.coarse.outcome},
            {Stage::cycle, report.motion.cycle.outcome},
            {Stage::settled, report.motion.settled.outcome},
            {Stage::attractors, report.attractors.outcome},

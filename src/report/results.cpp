@@ -86,9 +86,9 @@ void add_tail(Entry out, const Report& report)
 }
 
 /// Results of each stage, in the order of outcomes_of.
-constexpr std::array add_found = {add_equilibrium, add_modes, add_estimate,  add_response,   add_transient,
-                                  add_coarse,      add_cycle, add_settled,   add_attractors, add_branch,
-                                  add_sensitivity, add_sweep, add_robustness};
+constexpr std::array add_found = {add_equilibrium, add_modes,       add_estimate, add_response,
+                                  add_transient,   add_cycle,       add_settled,  add_attractors,
+                                  add_branch,      add_sensitivity, add_sweep,    add_robustness};
 
 void add_stage(Entry out, const Report& report, std::size_t number)
 {

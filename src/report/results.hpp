@@ -33,7 +33,6 @@ void add_modes(Entry out, const Report& report);
 void add_estimate(Entry out, const Report& report);
 void add_response(Entry out, const Report& report);
 void add_transient(Entry out, const Report& report);
-void add_coarse(Entry out, const Report& report);
 void add_cycle(Entry out, const Report& report);
 void add_settled(Entry out, const Report& report);
 void add_attractors(Entry out, const Report& report);

@@ -112,7 +112,7 @@ void ResultsFolder::make()
   const fs::path partial = place_ / partial_folder, finished = place_ / finished_folder;
   made_ = fs::create_directories(place_);
   const bool is_of_a_run = fs::exists(place_ / lock_file) || fs::exists(place_ / word(ResultFile::options));
-  for (const char* folder : {partial_folder, finished_folder, word(ResultFile::reduced), word(ResultFile::checkpoints)})
+  for (const char* folder : {partial_folder, finished_folder, word(ResultFile::checkpoints)})
     if (fs::exists(place_ / folder) && !is_of_a_run)
       refuse_folder(place_ / folder, "runs write into a folder of this name, and no run has made this one");
   const std::string holder = lock();
@@ -229,7 +229,6 @@ std::vector<fs::path> inputs_of(const Scene& scene)
 {
   std::vector<fs::path> inputs = {scene.file};
   if (scene.mesh) append_mesh(scene.mesh->file, inputs);
-  if (scene.mesh && !scene.cycle.coarse_mesh.empty()) append_mesh(scene.cycle.coarse_mesh, inputs);
   if (scene.matrices) append_matrices(*scene.matrices, inputs);
   for (const Superelement& superelement : scene.superelements) append_matrices(superelement.folder, inputs);
   if (scene.transient.start.kind == StartKind::file) inputs.push_back(scene.transient.start.file);

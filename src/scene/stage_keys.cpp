@@ -22,9 +22,6 @@ SceneKeys keys_of(ModesSettings& m)
       {"real_modes", &m.real_modes, "-", "number of real modes of the projection; 0: those of the band", not_negative},
       {"residual_passes", &m.residual_passes, "-", "corrections of the projection by the residual", not_negative},
       {"band", &m.band, "Hz", "every mode below is reported", positive},
-      {"reduced_matrices", &m.reduced_matrices, "switch",
-       "writes the brake, reduced to the modes found and to the attachment shapes of all pairs, as a matrix scene into "
-       "reduced/"},
   };
 }
 
@@ -65,14 +62,9 @@ SceneKeys keys_of(CycleSettings& c)
       {"enabled", &c.enabled, "switch", "run this stage; true when the table is there"},
       {"start", StartTarget{choice_of(c.start.kind), &c.start.file}, "word",
        "where the search starts: the unstable modes at their estimates (estimate), the followed mode at an amplitude "
-       "(mode), the end of the run's own transient (transient), the cycle on a coarser mesh (coarse), or a state file"},
+       "(mode), the end of the run's own transient (transient), or a state file"},
       {"amplitude", &c.amplitude, "m", "largest displacement at start = \"mode\"; 0: twice first lift-off",
        not_negative},
-      {"coarse_parameters", &c.coarse_parameters, "table",
-       "with start = \"coarse\": values for the DefineConstant of the scene's .geo that make its mesh coarser"},
-      {"coarse_mesh", &c.coarse_mesh, "path",
-       "or a mesh or geometry of its own, with the same parts, surfaces and groups; coarse_parameters are then its own",
-       file},
       {"steps_per_period", &c.steps_per_period, "-", "time steps a period; 0: chosen", not_negative},
       {"tolerance", &c.tolerance, "-", "largest residual in the full space that counts as a cycle; 0: chosen",
        not_negative},

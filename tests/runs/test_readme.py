@@ -194,8 +194,6 @@ def data_sets_of(file):
 UNLESS_STABLE = {"cycle.multipliers.crossing", "cycle.multipliers.would_decide", "cycle.multipliers.refusal"}
 # Written of points of a sweep that fail.
 UNLESS_STABLE |= {"sweep.points[].reason", "sweep.points[].motion.reason"}
-# Written of cycle.start = "coarse", which takes longer; test_coarse_start reads them.
-UNLESS_STABLE |= {f"coarse.{key}" for key in ("dofs", "pairs", "residual", "frequency_hz", "mean_fluctuating_energy", "periods")}
 # Written of branches with events, where a stable cycle stands beside a stable equilibrium, and of reduced models, which
 # test_branch reads.
 OF_SOME_BRANCHES = re.compile(r"branch\.((events|coexistence)\[\]\.\w+|reduction\..+|points\[\]\.full_residual|not_reduced)")

@@ -162,14 +162,14 @@ def make_foreign_partial(tmp_path):
 
 
 def make_matrices_of_a_results_name(tmp_path):
-    shutil.copytree(INPUTS / "oscillator" / "matrices", tmp_path / "out" / "reduced")
+    shutil.copytree(INPUTS / "oscillator" / "matrices", tmp_path / "out" / "checkpoint")
     return []
 
 
 def make_scene_on_matrices_of_a_results_name(tmp_path):
     make_matrices_of_a_results_name(tmp_path)
     (tmp_path / "out" / "options.txt").write_text("of a run")
-    return ["--set", f"matrices.folder={tmp_path}/out/reduced"]
+    return ["--set", f"matrices.folder={tmp_path}/out/checkpoint"]
 
 
 def make_link_to_nothing(tmp_path):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from squeal.common import SquealError
 
-PLACES = ("file", "folder", "gap_file", "coarse_mesh", "table")  # keys whose texts are files or folders that are read
+PLACES = ("file", "folder", "gap_file", "table")  # keys whose texts are files or folders that are read
 
 
 def toml(value: Any) -> str:

@@ -50,7 +50,7 @@ struct CycleProblem
   const StepOptions& step;
   const ModesOptions& modes_options; // of real modes beyond the band
   Mat probes = nullptr;
-  const State* given = nullptr;          // where CycleStartKind::transient, ::coarse and ::file start
+  const State* given = nullptr;          // where CycleStartKind::transient and ::file start
   double given_period = 0;               // [s] of the cycle that is given; 0: none is, and the mode's is taken
   int given_rounds = 1;                  // as many as that period may be of the cycle
   const ResumedOrbit* resumed = nullptr; // where shooting at the full model goes on, whatever it started from

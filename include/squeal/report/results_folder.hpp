@@ -23,13 +23,12 @@ enum class ResultFile
   field_places, // how ParaView finds its way in the fields
   resolved_scene,
   options,
-  reduced,     // a folder of matrices
   checkpoints, // a folder
 };
 
 template <> inline constexpr std::array words_of<ResultFile> = {
-    "report.json", "history.h5",    "sweep.csv",   "sweep_motions.csv", "robustness.csv", "fields.h5",
-    "fields.xdmf", "resolved.toml", "options.txt", "reduced",           "checkpoint"};
+    "report.json", "history.h5",  "sweep.csv",     "sweep_motions.csv", "robustness.csv",
+    "fields.h5",   "fields.xdmf", "resolved.toml", "options.txt",       "checkpoint"};
 
 /// The fate of the checkpoints of a run that ends.
 enum class Checkpoints

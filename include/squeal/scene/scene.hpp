@@ -74,11 +74,10 @@ enum class CycleStartKind
   estimate,  // the unstable modes at their estimated amplitudes
   mode,      // the unstable mode at a given amplitude
   transient, // the end of the run's own transient
-  coarse,    // the cycle of the same scene on a coarser mesh
   file,      // a state file
 };
 
-template <> inline constexpr std::array words_of<CycleStartKind> = {"estimate", "mode", "transient", "coarse", "file"};
+template <> inline constexpr std::array words_of<CycleStartKind> = {"estimate", "mode", "transient", "file"};
 
 /// Where the search for the cycle starts, with its file.
 struct CycleStart
@@ -92,10 +91,9 @@ struct ModesSettings
 {
   bool enabled = true;
   ModesMethod method = ModesMethod::automatic;
-  int real_modes = 0;            // [-] number of real modes of the projection; 0: those below the band
-  int residual_passes = 3;       // [-] number of corrections of the projection
-  double band = 20000;           // [Hz] modes below this frequency are reported
-  bool reduced_matrices = false; // the brake reduced to them and to the pairs' attachments is written as matrices
+  int real_modes = 0;      // [-] number of real modes of the projection; 0: those below the band
+  int residual_passes = 3; // [-] number of corrections of the projection
+  double band = 20000;     // [Hz] modes below this frequency are reported
 };
 
 /// Settings of the energy estimate.
@@ -135,15 +133,13 @@ struct CycleSettings
 {
   bool enabled = false;
   CycleStart start;
-  double amplitude = 0; // [m] largest displacement of the mode at CycleStartKind::mode; 0: twice lift-off
-  std::map<std::string, double> coarse_parameters; // of CycleStartKind::coarse: of the geometry, instead of the mesh's
-  std::filesystem::path coarse_mesh;               // or a mesh or geometry of its own; absolute
-  int steps_per_period = 0;                        // [-] 0: chosen
-  double tolerance = 0;                            // [-] on the residual of the full state; 0: chosen
-  int free_periods = 10;                           // [-] number of periods integrated before the first Newton step
-  int starts = 0;                                  // [-] number of starts whose motions are listed; 0: chosen
-  double theta = 0.5;                              // [-] of the theta method
-  std::filesystem::path save_state;                // state file of the start of the cycle; none if empty
+  double amplitude = 0;             // [m] largest displacement of the mode at CycleStartKind::mode; 0: twice lift-off
+  int steps_per_period = 0;         // [-] 0: chosen
+  double tolerance = 0;             // [-] on the residual of the full state; 0: chosen
+  int free_periods = 10;            // [-] number of periods integrated before the first Newton step
+  int starts = 0;                   // [-] number of starts whose motions are listed; 0: chosen
+  double theta = 0.5;               // [-] of the theta method
+  std::filesystem::path save_state; // state file of the start of the cycle; none if empty
 };
 
 /// The branch of the limit cycle along a number of the scene.
