@@ -71,8 +71,8 @@ OptionList options_of(ProgramOptions& options)
        "needs, within limits. A number bounds the columns of the whole matrix or of a search"},
       {"-cycle_watched_periods", &shooting.watched_periods, Range::any,
        "periods integrated from beside the cycle found, 3 % of its fluctuation along the fastest motion, to see it "
-       "grow or decay; again from a tenth and a hundredth of that where growth and multiplier differ; below 0: 200 "
-       "where a whole tangent does not decide, else none"},
+       "grow or decay; again from a tenth and a hundredth of that where growth and multiplier differ; below 0: where "
+       "that decides what a bar leaves open, at most 200, as the search took or as is affordable"},
       {"-settled_periods", &options.settled.periods, Range::not_negative,
        "largest number of periods integrated to see what a motion settles on where no cycle attracts; 0: 2048, or 512 "
        "where periods are dear"},
