@@ -178,15 +178,16 @@ double memory_of_step(const Sizes& sizes, bool in_factor)
 }
 
 /// A reduced model has at most a shape for each pair, and those of the modes. Two may be held: that of the start, which
-/// takes no more than its part of what is `free`, and that of the multipliers, of fewer shapes. The latter is done
-/// without where it does not fit. The tangent needs a whole W.
+/// takes no more than its part of what is `free`, and that of the multipliers. Both have fewer shapes unless the
+/// reduced cycle is the answer. The latter is done without where it does not fit. The tangent needs a whole W.
 double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, bool in_factor, double free)
 {
   const double whole = in_factor || shares_operator(sizes) ? sizes.condensed_operator() : 0;
   const double least = memory_of_step(sizes, in_factor) + whole + number * vectors_of_shooting * sizes.dofs;
   const auto shapes = [&](double pairs) { return memory_of_reduction(sizes.dofs, pairs + vectors_of_modes_kept); };
-  const double start = fidelity == CycleModel::full ? 0 : std::min(shapes(sizes.pairs), memory_for_shapes(free));
-  const double multipliers = shapes(std::min<double>(sizes.pairs, attachments_on_recorded_contact));
+  const double multipliers = shapes(std::min<double>(sizes.pairs, attachments_on_recorded_contact)),
+               all = fidelity == CycleModel::reduced ? shapes(sizes.pairs) : multipliers;
+  const double start = fidelity == CycleModel::full ? 0 : std::min(all, memory_for_shapes(free));
   return least + start + multipliers <= free ? least + start + multipliers : least + start;
 }
 

@@ -84,7 +84,7 @@ private:
   std::vector<ReducedBrake> samples_;
   double interpolation_error_ = 0;
   std::unique_ptr<At> at_;
-  std::vector<RecordedContact> recorded_;
+  std::vector<StepRecord> recorded_;
   std::optional<ReducedMap> other_grid_; // of the recorded steps, where it is not the map's own
   MonodromyCorrection correction_;       // of the flows
   MonodromyCorrection lifted_correction_;

@@ -59,7 +59,8 @@ void note_model_errors(const CycleCorrection& correction, FittedCycle& found)
 /// the accuracy needs. It does not answer where that shooting left the reduced cycle.
 FittedCycle correct_on_full_model(const ReducedSearch& search, const ReducedCycle& reduced, StepChoice steps)
 {
-  const CycleProblem& problem = search.problem;
+  CycleProblem problem = with_settings(search.problem, search.problem.settings);
+  problem.reduced = &search.model;
   const Preconditioner preconditioner =
       preconditioner_of(search.correction, coordinates_in(search.model, problem.sliding.structure));
   const Owned<Vec> state = full_motion(search, reduced.state);

@@ -87,9 +87,9 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
 
 CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings)
 {
-  return {problem.sliding, problem.linearised,   problem.modes,         problem.unstable,
-          settings,        problem.step,         problem.modes_options, problem.probes,
-          problem.given,   problem.given_period, problem.given_rounds,  problem.resumed};
+  return {problem.sliding,      problem.linearised,    problem.modes,  problem.unstable, settings,
+          problem.step,         problem.modes_options, problem.probes, problem.given,    problem.given_period,
+          problem.given_rounds, problem.resumed,       problem.reduced};
 }
 
 std::vector<State> other_unstable_motions(const CycleProblem& problem)

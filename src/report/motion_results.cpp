@@ -329,7 +329,7 @@ void add_fidelity(Entry whole, const Fidelity& fidelity)
   reduced.show("size", "-", "shapes of the reduced model", fidelity.size);
   reduced.show("modes", "-", "shapes of modes among them", fidelity.modes);
   reduced.show("attachment_shapes", "-", "attachment shapes among them", fidelity.attachment_shapes);
-  out.add("left_out_shapes", "-", "attachment shapes that the free memory leaves out", fidelity.left_out_shapes);
+  out.add("left_out_shapes", "-", "attachment shapes that are left out", fidelity.left_out_shapes);
   out.add("lost_compliance", "-", "mean part of the active pairs' compliance in those", fidelity.lost_compliance);
   reduced.show("active_pairs", "-", "pairs with unilateral contact and friction in it", fidelity.active_pairs);
   reduced.show("sliding_pairs", "-", "pairs taken to stay closed and sliding; the rest stay open",
