@@ -131,6 +131,11 @@ TEST_CASE("ranks that follow a motion of the reduced model together find what on
   CHECK(near(alone.end.rate.v, together.end.rate.v));
   CHECK(near(alone.monodromy, together.monodromy));
   CHECK(near(alone.adjoint, together.adjoint));
+  // the adjoint is the transpose: Phi'M, M = Phi S, has M'M in the rows of S
+  const Eigen::Index size = model.size(), slow = model.slow;
+  Eigen::MatrixXd seen(2 * slow, alone.adjoint.cols());
+  seen << alone.adjoint.topRows(slow), alone.adjoint.middleRows(size, slow);
+  CHECK(near(Eigen::MatrixXd(alone.monodromy.transpose() * alone.monodromy), seen));
   // What all ranks decide on has the same bits.
   CHECK(distance_to_first_rank(together.end.end.v) == 0);
   CHECK(distance_to_first_rank(together.end.rate.q) == 0);
