@@ -130,7 +130,7 @@ double run_one_period(ReducedMap& map, FreeMotion& motion, double& correction)
   return decides[0];
 }
 
-/// Free periods until one comes back to where shooting goes on, or its energy exceeds `most`.
+/// Free periods until one comes back to within half a percent, or its energy exceeds `most`.
 void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
 {
   const double clock = MPI_Wtime();
@@ -140,8 +140,7 @@ void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
   double missed = 1, correction = 0;
   const auto limited = [&] { return std::clamp(correction, -0.2 * motion.period, 0.2 * motion.period); };
   // compared every tenth period: whatever the rounding, it stops at the same
-  constexpr double near = 2e-2;
-  const auto periodic = [&] { return missed <= near && fidelity.reduced_periods % 10 == 0; };
+  const auto periodic = [&] { return missed <= 5e-3 && fidelity.reduced_periods % 10 == 0; };
   while (!periodic() && fidelity.reduced_periods < most_free_periods)
   {
     end_if_asked(map.comm);
