@@ -8,6 +8,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -108,6 +109,39 @@ class Run:
     def messages(self):
         """squeal's own error messages, one line each (mpirun adds lines of its own when a rank fails)."""
         return re.findall(r"^squeal: .*$", self.errors, re.M)
+
+
+def wait_for(condition, seconds=600):
+    """Waits for an event; the seconds are a guard against a hang, not a limit that a slow machine meets."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it never came true"
+        time.sleep(0.02)
+
+
+def interrupted(sign, *arguments, ranks=1, number=signal.SIGUSR1, after=0):
+    """Exit code, what was printed, and errors of a run that gets a signal when a line matches `sign`, or `after` seconds later.
+    A pipe that holds one line is read line by line: one process is at most two lines ahead of the signal, however busy the
+    machine is. mpirun reads ahead, so that ranks may have ended: then the exit code is not 3."""
+    read, write = os.pipe2(os.O_DIRECT)
+    fcntl.fcntl(write, fcntl.F_SETPIPE_SZ, 4096)
+    launcher = [os.environ.get("MPIEXEC", "mpirun"), "-n", str(ranks)] if ranks > 1 else []
+    command = [*launcher, os.environ["SQUEAL"], *map(str, arguments)]
+    sent, printed = False, ""
+    with cores(ranks), tempfile.TemporaryFile("w+") as errors:
+        run = subprocess.Popen(command, stdout=write, stderr=errors, env={**os.environ, **NO_WAIT})
+        os.close(write)
+        while lines := os.read(read, 65536):
+            printed += lines.decode()
+            if not sent and re.search(sign, printed, re.M):
+                time.sleep(after)
+                run.send_signal(number)
+                sent = True
+        os.close(read)
+        code = run.wait()
+        errors.seek(0)
+        assert sent, f"{sign} was not printed: {printed}{errors.read()}"
+        return code, printed, errors.read()
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import signal
 import subprocess
 
 import pytest
-from conftest import INPUTS
+from conftest import INPUTS, interrupted
 
 OSCILLATOR = INPUTS / "oscillator" / "scene.toml"
 STAGES = ("equilibrium …", "modes …")
@@ -202,20 +202,15 @@ def test_options_beside_a_matrix_are_not_obeyed(squeal, tmp_path):
 
 def test_a_signal_ends_a_sweep_while_its_equilibria_are_sought(tmp_path):
     """A million of them take minutes, and no mode is sought before."""
-    command = [os.environ["SQUEAL"], OSCILLATOR, "--output", tmp_path / "results", "--set", "sweep.key=friction.coefficient", "--set",
-               "sweep.from=0.1", "--set", "sweep.to=0.5", "--set", "sweep.points=1000000", "--set", "cycle.enabled=false", "--set",
-               "transient.enabled=false"]
-    run = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    for line in run.stdout:
-        if line.startswith("sweep"):
-            break
-    run.send_signal(signal.SIGTERM)
-    assert "ended by SIGTERM" in run.communicate(timeout=60)[0] and run.returncode == 3
+    arguments = [OSCILLATOR, "--output", tmp_path / "results", "--set", "sweep.key=friction.coefficient", "--set", "sweep.from=0.1", "--set",
+                 "sweep.to=0.5", "--set", "sweep.points=1000000", "--set", "cycle.enabled=false", "--set", "transient.enabled=false"]
+    code, printed, errors = interrupted("^sweep", *arguments, number=signal.SIGTERM)
+    assert "ended by SIGTERM" in printed and code == 3, errors
 
 
 def run_here(folder, *arguments, **environment):
     return subprocess.run([os.environ["SQUEAL"], OSCILLATOR, "--dry-run", *arguments], cwd=folder, capture_output=True,
-                          text=True, timeout=100, env=os.environ | environment)
+                          text=True, timeout=300, env=os.environ | environment)
 
 
 def test_a_working_folder_that_is_gone_is_one_message(tmp_path):
@@ -258,7 +253,7 @@ def test_points_beyond_the_memory_are_refused(squeal, points):
 def test_an_output_that_no_folder_can_have_is_refused(tmp_path, name):
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     done = subprocess.run([os.environ["SQUEAL"], OSCILLATOR, "--output", tmp_path / name], capture_output=True, text=True,
-                          timeout=30, cwd=tmp_path)
+                          timeout=300, cwd=tmp_path)
     assert done.returncode == 1 and "--output DIR" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
 
 
@@ -274,4 +269,4 @@ def test_large_reactions_do_not_hold_up_the_estimate(squeal, force):
     run = squeal(OSCILLATOR, "--set", f"force.0.vector=[0,{-force},0]", "--set", "transient.enabled=false", "--set",
                  "cycle.enabled=false", ranks=1)
     assert run.code in (0, 2), run.errors
-    assert run.report["timings"]["estimate"] < 5
+    assert run.report["processor_seconds"]["estimate"] < 5

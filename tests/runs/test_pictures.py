@@ -17,7 +17,7 @@ from matplotlib.text import Text  # noqa: E402
 
 
 def plot(*words):
-    done = subprocess.run([sys.executable, ROOT / "tools" / "plot", *map(str, words)], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, ROOT / "tools" / "plot", *map(str, words)], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

@@ -6,10 +6,9 @@ import resource
 import shutil
 import signal
 import subprocess
-import time
 
 import pytest
-from conftest import INPUTS, ROOT, cores
+from conftest import INPUTS, ROOT, cores, wait_for
 
 SCENE = INPUTS / "oscillator" / "scene.toml"
 SHORT = ["--set", "transient.periods=5", "--set", "cycle.enabled=false"]
@@ -19,13 +18,6 @@ ENDLESS = ["--set", "transient.periods=1e5"]
 def start(output, *arguments, scene=SCENE):
     command = [os.environ["SQUEAL"], scene, "--output", output, *arguments]
     return subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-
-
-def wait_for(condition, seconds=20):
-    end = time.time() + seconds
-    while not condition():
-        assert time.time() < end, "it never came true"
-        time.sleep(0.02)
 
 
 @pytest.fixture
