@@ -1,6 +1,5 @@
 """Runs the squeal program as a user does: by itself or by mpirun, a scene file, its output folder."""
 
-import contextlib
 import fcntl
 import importlib.machinery
 import importlib.util
@@ -20,6 +19,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 INPUTS = ROOT / "inputs"
+sys.path.insert(0, str(ROOT / "tests" / "support"))
+from cores import cores  # noqa: E402
 
 
 def load_tool(name):
@@ -33,56 +34,6 @@ def load_tool(name):
 
 # A run that is refused ends together on all ranks; mpirun would wait two seconds for those that have ended.
 NO_WAIT = {"OMPI_MCA_odls_base_sigkill_timeout": "0"}
-
-
-held = 0  # cores that this test has
-PATIENCE = 3  # [s] that runs of fewer ranks may begin before one that waits for several cores
-
-
-def lock_cores(folder, count):
-    """The locked files of as many free cores of the machine's; none where there are fewer."""
-    locked = []
-    for number in range(len(os.sched_getaffinity(0))):
-        core = open(folder / str(number), "w")
-        try:
-            fcntl.flock(core, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            locked.append(core)
-        except BlockingIOError:
-            core.close()
-        if len(locked) == count:
-            return locked
-    for core in locked:
-        core.close()
-    return []
-
-
-@contextlib.contextmanager
-def cores(count):
-    """Waits for as many cores that no other test takes, of those that the machine has. Ranks wait for each other at every
-    message: beside a run that leaves one of them no core, each message takes a slice of the scheduler's, milliseconds."""
-    global held
-    wanted = min(count, len(os.sched_getaffinity(0)))
-    if held:  # by the test whose run this is
-        assert wanted <= held
-        yield
-        return
-    folder = Path(tempfile.gettempdir()) / f"squeal_cores_{os.getuid()}"
-    folder.mkdir(exist_ok=True)
-    patient_until = time.monotonic() + PATIENCE
-    with open(folder / "gathering", "w") as gathering:  # only who has locked it takes cores
-        fcntl.flock(gathering, fcntl.LOCK_EX)
-        while not (locked := lock_cores(folder, wanted)):
-            if time.monotonic() < patient_until:
-                fcntl.flock(gathering, fcntl.LOCK_UN)
-            time.sleep(0.01)
-            fcntl.flock(gathering, fcntl.LOCK_EX)
-    held = wanted
-    try:
-        yield
-    finally:
-        held = 0
-        for core in locked:
-            core.close()
 
 
 class Run:
