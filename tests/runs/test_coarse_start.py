@@ -13,27 +13,22 @@ def coarse(keys):
 
 
 def test_the_cycle_is_that_of_the_default_start(converged):
-    """On one rank by parameters of the geometry, on two by a mesh file of its own."""
+    """On two ranks by a mesh file of its own and parameters of the geometry; the default start on one."""
     scene = [PIN, *GIVEN, "--set", "fidelity=full", "--set", "mesh.parameters.divisions=5"]
     default = converged(*scene, ranks=1).report["cycle"]
-    parameters = "coarse_parameters={divisions=4}"
     file = f"coarse_mesh={INPUTS / 'pin_on_disc' / 'pin.geo'}"
-    one = converged(*scene, *coarse([parameters]), ranks=1).report
-    two = converged(*scene, *coarse([file, parameters]), ranks=2).report
-    for report in (one, two):
-        coarser = report["coarse"]
-        assert coarser["outcome"] == "converged" and coarser["dofs"] == 2821 and coarser["pairs"] == 25
-        assert coarser["residual"] <= 1e-3 and coarser["mean_fluctuating_energy"] > 0 and coarser["periods"] > 10
-        assert coarser["frequency_hz"] == pytest.approx(report["cycle"]["frequency_hz"], rel=0.1)
-        assert report["cycle"]["residual_full"] <= TOLERANCE
-        # no free periods, and the contact of the first one for a preconditioner: 25, by the estimated one 35, from the estimate 49
-        assert report["cycle"]["periods_integrated"] <= default["periods_integrated"] - 20
-        # cycles of 60 steps differ by where among the steps their events fall: 2.4e-5 and 1.3e-3 seen; the step's own
-        # error of the period is 1e-3
-        assert report["cycle"]["period"] == pytest.approx(default["period"], rel=1e-4)
-        assert report["cycle"]["mean_fluctuating_energy"] == pytest.approx(default["mean_fluctuating_energy"], rel=5e-3)
-    assert one["coarse"]["periods"] == two["coarse"]["periods"]
-    assert one["cycle"]["period"] == pytest.approx(two["cycle"]["period"], rel=1e3 * TOLERANCE)
+    report = converged(*scene, *coarse([file, "coarse_parameters={divisions=4}"]), ranks=2).report
+    coarser = report["coarse"]
+    assert coarser["outcome"] == "converged" and coarser["dofs"] == 2821 and coarser["pairs"] == 25
+    assert coarser["residual"] <= 1e-3 and coarser["mean_fluctuating_energy"] > 0 and coarser["periods"] > 10
+    assert coarser["frequency_hz"] == pytest.approx(report["cycle"]["frequency_hz"], rel=0.1)
+    assert report["cycle"]["residual_full"] <= TOLERANCE
+    # no free periods, and the contact of the first one for a preconditioner: 25, by the estimated one 35, from the estimate 49
+    assert report["cycle"]["periods_integrated"] <= default["periods_integrated"] - 20
+    # cycles of 60 steps differ by where among the steps their events fall: 2.4e-5 and 1.3e-3 seen; the step's own
+    # error of the period is 1e-3
+    assert report["cycle"]["period"] == pytest.approx(default["period"], rel=1e-4)
+    assert report["cycle"]["mean_fluctuating_energy"] == pytest.approx(default["mean_fluctuating_energy"], rel=5e-3)
 
 
 def test_without_a_cycle_there_the_search_is_skipped(squeal):
@@ -58,6 +53,6 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_bad_input_is_refused_before_the_first_stage(squeal, case):
     arguments, words = WRONG[case]
-    run = squeal(*arguments, ranks=2)
+    run = squeal(*arguments, ranks=2 if case == "other parts" else 1)
     assert run.code == 1 and len(run.messages) == 1 and words in run.messages[0], run.errors
     assert "equilibrium …" not in run.printed

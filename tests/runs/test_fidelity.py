@@ -18,7 +18,7 @@ def energy(report):
 
 @pytest.fixture(scope="module")
 def reduced(module_run):
-    return [module_run(*PIN, "--set", "fidelity=reduced", ranks=ranks) for ranks in (1, 2, 3)]
+    return [module_run(*PIN, "--set", "fidelity=reduced", ranks=ranks) for ranks in (1, 2)]
 
 
 @pytest.fixture(scope="module")

@@ -148,8 +148,7 @@ def test_contact_that_opens_at_zero_is_found(values, converged):
     assert min(force for force, closed in places if not closed) == pytest.approx(0, abs=1e-5)
 
 
-@pytest.mark.parametrize("values", ["[0.05,0.5]", "[0.05,0.275,0.5]", "[0.1,0.3]", "[0.1,2.5]", "[0.1,1.3,2.5]",
-                                    "[0.1,0.9,1.7,2.5]", "[0.1,0.3,0.9,1.6,2.5]"])
+@pytest.mark.parametrize("values", ["[0.05,0.5]", "[0.05,0.275,0.5]", "[0.1,2.5]", "[0.1,0.3,0.9,1.6,2.5]"])
 def test_the_exact_threshold_of_the_oscillator(values, converged):
     """Whatever the points: lock-in lies between two of them, where modes cannot be told apart, and the growth rate is
     flat before it. The mode that it names is the unstable one at every later point."""
@@ -166,7 +165,6 @@ def test_the_exact_threshold_of_the_oscillator(values, converged):
 
 @pytest.mark.parametrize("key, value, override, unit", [
     ("spring.0.damping", 0.03, "spring.0.damping={}", "N s/m"),
-    ("spring.1.stiffness", 0.5, "spring.1.stiffness={}", "N/m"),
     ("contact.0.velocity.0", 0.9, "contact.0.velocity=[{},0,0]", "m/s"),
     ("force.0.vector.1", -2.0, "force.0.vector=[0,{},0]", "N"),
     ("point.pad.mass", 1.3, "point.pad.mass={}", "kg"),
@@ -195,8 +193,7 @@ def test_two_numbers(converged):
     assert thresholds[0.02] == pytest.approx(HOPF, abs=1e-5) and abs(thresholds[0.05] - HOPF) > 1e-4
 
 
-@pytest.mark.parametrize("key, ends", [("point.pad.mass", (0.2, 5.0)), ("point.disc.mass", (0.1, 10.0))])
-@pytest.mark.parametrize("directions", ["one", "both"])
+@pytest.mark.parametrize("key, ends, directions", [("point.pad.mass", (0.2, 5.0), "both"), ("point.disc.mass", (0.1, 10.0), "one")])
 def test_modes_keep_their_numbers_over_the_plane(key, ends, directions, converged):
     """Between the first lines and the last their shapes change too much for a look at both: modes are followed from line to line."""
     run = converged(*OSCILLATOR, *sweep_of(f"['friction.coefficient','{key}']", f"[0.1,{ends[0]}]", f"[0.2,{ends[1]}]", points="[2,4]",
@@ -219,7 +216,7 @@ def test_random_points_repeat_with_their_seed(converged):
     assert all(0.05 <= float(row["friction.coefficient"]) <= 0.5 and row["track"] == "" for row in first)
 
 
-@pytest.mark.parametrize("ranks, groups", [(2, 0), (2, 1), (3, 2)])
+@pytest.mark.parametrize("ranks, groups", [(2, 0), (3, 2)])
 def test_ranks_and_their_groups_agree(ranks, groups, pin, squeal):
     """However the points are shared: the same modes, under the same names, and the same thresholds."""
     other = squeal(*PIN, *sweep_of(end=0.35, points=4, directions="both"), "-sweep_groups", str(groups), ranks=ranks)
