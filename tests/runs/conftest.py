@@ -83,7 +83,7 @@ def interrupted(sign, *arguments, ranks=1, number=signal.SIGUSR1, after=0):
         run = subprocess.Popen(command, stdout=write, stderr=errors, env={**os.environ, **NO_WAIT})
         os.close(write)
         while lines := os.read(read, 65536):
-            printed += lines.decode()
+            printed += lines.decode(errors="replace")
             if not sent and re.search(sign, printed, re.M):
                 time.sleep(after)
                 run.send_signal(number)
