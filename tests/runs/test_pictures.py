@@ -323,6 +323,40 @@ def test_ticks_of_a_logarithm_away_from_zero_keep_apart(scale, low, high):
     assert 0 in ticks and len(ticks) <= 13 and np.abs(ticks[ticks != 0]).min() >= 2 * scale
 
 
+@pytest.mark.parametrize("scale, high, tick", [(67.3, 67.3, 60), (4.2, 8.9, 8), (0.05, 0.051, 0.05)])
+def test_a_side_without_a_decade_has_a_number(scale, high, tick):
+    from squeal.plot_stability import symlog_ticks
+
+    assert max(symlog_ticks(scale, -1e4, high)) == pytest.approx(tick)
+
+
+def table_sweep(**names):
+    """Points of four numbers: two that touch and turn, one apart, one that failed."""
+    points = [{"values": [load, speed, offset], "direction": 1, "outcome": "converged", "closed": closed, "growth_rate": growth}
+              for load, speed, offset, closed, growth in ((5, 2, -1, 9, 7.0), (5, -2, 1, 9, -1.0), (-5, 2, 1, 0, -1.0))]
+    points.append({"values": [7, 0, 1], "direction": 1, "outcome": "failed", "reason": "nothing drives a pair there", "closed": 9})
+    return {"keys": ["numbers.load", "numbers.speed", "mesh.parameters.offset"], "names": ["force.0.vector.2", "rotor.0.rate", ""], "points": points}
+
+
+def test_points_where_nothing_touches_or_that_failed_are_not_quiet_ones():
+    from squeal import plot_sweep
+
+    class Swept:
+        title, folder = "matrix", Path("matrix")
+
+        def lines(self, stage):
+            return [{"numbers.load": "5", "numbers.speed": "2", "mesh.parameters.offset": "-1", "direction": "1", "growth_rate": "7", "frequency_hz": "900"}]
+
+    sweep = table_sweep()
+    figure = plot_sweep.draw_occurrence(Swept(), sweep)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels[:2] == ["speed above 0: 1 of 1 point unstable", "speed below 0: 0 of 1 point unstable"]  # not the offset, which has both signs too
+    assert figure.not_counted == ["Nothing touches at 1 point, not counted: load -5, speed 2, offset 1.",
+                                  "1 point failed: load 7, speed 0, offset 1 (nothing drives a pair there)."]
+    caption = plot_captions.of_sweep([], figure)
+    assert all(sentence in caption for sentence in figure.not_counted)
+
+
 def test_the_line_of_a_mode_passes_through_its_thresholds():
     from squeal import plot_sweep
 

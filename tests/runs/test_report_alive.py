@@ -96,6 +96,42 @@ def test_a_rotor_drives_the_contacts_of_its_part(pin, tmp_path):
         assert count == 1 and place.radius == radius
 
 
+def test_numbers_by_name_drive_the_pictures_and_the_page(pin, tmp_path):
+    """A rate and a coefficient by name, one with a minus: the same places, and a page."""
+    shutil.copytree(pin.folder, tmp_path / "named")
+    file = tmp_path / "named" / "resolved.toml"
+    text, rates = re.subn(r"(\brate\S* = )20\b", r'\1"-speed"', file.read_text())
+    text, laws = re.subn(r"(\ncoefficient = )[\d.]+", r'\1"mu"', text)
+    file.write_text(text.replace("[mesh]", 'numbers = { "speed" = -20, "mu" = 0.3 }\n\n[mesh]', 1))
+    named = squeal.Results(tmp_path / "named")
+    assert rates == laws == 1 and [place.marks() for place in places_of(named)] == [place.marks() for place in places_of(pin)]
+    assert "20 rad/s" in report_input.input_of(named) and "speed" not in report_input.input_of(named)
+    page = page_of(tmp_path / "named", folder=tmp_path)
+    assert "20 rad/s" in page
+
+
+def test_marks_of_the_model_stand_apart_over_its_picture(pin):
+    """The centre of pressure and both edges are seen from each side, and no white column or row is left."""
+    pytest.importorskip("pyvista")
+    from squeal import plot_model
+
+    _, pictures = plot_model.model_pictures(pin)
+    for picture, ((centre, edges),) in pictures:
+        assert set(edges) == {"leading", "trailing"} and np.linalg.norm(edges["leading"] - edges["trailing"]) > 10
+        high, across = picture.shape[:2]
+        assert all(0 <= at[0] < across and 0 <= at[1] < high for at in (centre, *edges.values()))
+        assert (picture < 250).any(axis=(1, 2)).mean() > 0.8 and (picture < 250).any(axis=(0, 2)).mean() > 0.8
+
+
+def test_the_slope_of_the_mechanical_energy_is_the_sum_of_powers(pin):
+    from squeal import plot_motion
+
+    powers = plot_motion.powers_of(pin)
+    total = powers["contact_power"] - np.abs(powers["damping_power"]) + powers["load_power"]
+    steps = np.diff(powers["energy"])
+    assert steps == pytest.approx(total[1:] * np.diff(powers["time"]), abs=1e-6 * np.abs(steps).max())
+
+
 def test_a_pad_all_round_the_axis_has_no_edges_and_one_on_a_belt_has():
     angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)

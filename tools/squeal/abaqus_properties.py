@@ -1,7 +1,7 @@
 """Materials, their axes, and sections of Abaqus and CalculiX."""
 
 import numpy as np
-from squeal.deck_files import Problem, number
+from squeal.deck_files import Problem, number, undefined
 from squeal.mesh_model import FLAT, KINDS, Part
 
 ORTHOTROPIC = ("ENGINEERING CONSTANTS", "ORTHOTROPIC", "ORTHO")
@@ -102,13 +102,17 @@ def read_sections(deck):
     their sets."""
     model, elements = deck.model, deck.elements
     owner, axes = {}, read_orientations(deck)
+    known = {name.upper(): name for block in deck.blocks if block.name == "ORIENTATION" and (name := block.options.get("NAME"))}
     for block in deck.blocks:
         if block.name not in ("SOLID SECTION", "SHELL SECTION"):
             continue
         name = block.options.get("ELSET", "")
         numbers = elements.sets.get(name, block.place, "the element set")
         part = Part([], block.options.get("MATERIAL", "").upper())
-        part.axes = axes.get(block.options.get("ORIENTATION", "").upper())
+        turned = block.options.get("ORIENTATION", "")
+        if turned and turned.upper() not in known:
+            raise undefined(block.place, f"*{block.name}: the orientation", turned, known.values())
+        part.axes = axes.get(turned.upper())
         if block.name == "SHELL SECTION":
             read_thickness(block, part, deck)
         shown = elements.sets.names[name.upper()]

@@ -5,7 +5,7 @@ import re
 from collections import Counter
 
 import numpy as np
-from squeal.deck_files import Problem, lines_of, number, whole
+from squeal.deck_files import Problem, lines_of, number, undefined, whole
 from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part, corners_of
 
 # squeal's kinds by element type and by the number of different nodes
@@ -13,6 +13,7 @@ SOLIDS = {45: 8, 65: 8, 185: 8, 190: 8, 95: 20, 186: 20, 92: 10, 187: 10, 285: 4
 SHELLS = {63: 4, 181: 4, 43: 4}
 TARGETS, CONTACTS = {169, 170}, {171, 172, 173, 174, 175, 177}
 SKINS = {152: 4, 154: 8}
+BONDED = (3, 5, 6)  # values of the option 12 of contact elements
 MOTION_OF = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "rx", "ROTY": "ry", "ROTZ": "rz"}
 FORCE_OF = {name: i for i, name in enumerate(("FX", "FY", "FZ", "MX", "MY", "MZ"))}
 ELASTIC = {"EX": "young", "PRXY": "poisson", "NUXY": "poisson", "DENS": "density", "DMPR": "loss_factor", "BETD": "beta", "ALPD": "alpha"}
@@ -22,7 +23,7 @@ WEDGE_OF = [0, 1, 2, 4, 5, 6]
 TET_OF = [0, 1, 2, 4]
 SILENT = set("/COM /NOPR /GOPR /PREP7 /TITLE /SOLU /GO /OUTPUT /UNITS /VIEW /AUTO FINISH NUMOFF *IF *ELSE *ENDIF *SET DOF N R5.3 MPTEMP "
              "EXTOPT TREF IRLF BFUNIF ACEL OMEGA DOMEGA CGLOC CGOMEGA DCGOMG KUSE TIME ALPHAD BETAD DMPRAT DMPSTR CRPLIM NCNV "
-             "NEQIT ERESX TOFFST RLBLOCK KEYOPT SECTYPE SECBLOCK ANTYPE ETBLOCK LSCLEAR FCUM DELTIM KBC SHPP SHELL".split())
+             "NEQIT ERESX TOFFST RLBLOCK SECTYPE SECBLOCK ANTYPE ETBLOCK LSCLEAR FCUM DELTIM KBC SHPP SHELL".split())
 
 
 class Deck:
@@ -33,6 +34,9 @@ class Deck:
         self.types, self.materials = {}, {}
         self.constants = {}  # of materials by number and label
         self.of_pair = {}  # faces and kind by the number of a real constant: "target", "contact"
+        self.sides = {}  # (real constant, "target" or "contact") by the numbers of such elements
+        self.options = {}  # of element types, by type and number of the option
+        self.turning = []  # (name of a component, vector of its rate, place)
         self.frictions = {}
         self.held = {}
         self.bodies = {}  # elements by material and type
@@ -184,8 +188,9 @@ def add_element(deck, place, label, attributes, nodes):
     elif kind in TARGETS | CONTACTS:
         side = "target" if kind in TARGETS else "contact"
         deck.of_pair.setdefault(real, {"material": material}).setdefault(side, []).append(face_of(nodes))
+        deck.sides[label] = real, side
         if side == "contact":
-            deck.of_pair[real]["material"] = material
+            deck.of_pair[real] |= {"material": material, "type": kind_number}
     elif kind == 179:
         deck.bolts.setdefault(section, []).append((place, nodes))
     elif kind == 21:
@@ -281,7 +286,19 @@ def gravity(words, place, deck):
         deck.model.gravity = [-v for v in values]  # an acceleration of the frame
 
 
-COMMANDS = {"ET": element_type, "MPDATA": material_data, "MP": material_data, "D": support, "F": force, "CE": equation, "ACEL": gravity}
+def key_option(words, place, deck):
+    if len(words) > 3:
+        deck.options[whole(words[1], place), whole(words[2], place)] = whole(words[3] or "0", place)
+
+
+def rotation(words, place, deck):
+    """CMROTATE,component,x,y,z: the rate about the global axes of the elements that turn."""
+    rate = [number(word or "0", place) for word in (words[2:] + ["0"] * 3)[:3]]
+    if any(rate):
+        deck.turning.append((words[1] if len(words) > 1 else "", rate, place))
+
+
+COMMANDS = {"CMROTATE": rotation, "KEYOPT": key_option, "ET": element_type, "MPDATA": material_data, "MP": material_data, "D": support, "F": force, "CE": equation, "ACEL": gravity}
 
 
 # ---- what the whole deck makes
@@ -297,9 +314,10 @@ def finish(deck):
     for (material, section), elements in deck.bodies.items():
         name = f"material_{material}" + (f"_shells_{section}" if section and several[material] > 1 else "")
         model.parts[model.unused(name)] = Part(elements, material)
-    name_parts(model)
+    rotors = rotors_of(deck)
+    name_parts(deck)
     supports(deck)
-    pairs(deck)
+    pairs(deck, rotors)
     for section, elements in deck.bolts.items():
         deck.note(f"the bolt of section {section}: {len(elements)} PRETS179, whose two sides have nodes of their own", elements[0][0])
     model.notes += [f"{count} elements of {name}" for name, count in sorted(deck.other_elements.items())]
@@ -307,9 +325,29 @@ def finish(deck):
         model.notes.append("the commands " + ", ".join(f"{name} ({count})" for name, count in sorted(deck.left_out.items())))
 
 
-def name_parts(model):
+def rotors_of(deck):
+    """Rotations of the parts that a component has elements of, or of the sides of contacts where it has those alone."""
+    model, of_side = deck.model, {}
+    for name, rate, place in deck.turning:
+        if name not in model.element_sets:
+            raise undefined(place, "CMROTATE: the component of elements", name, model.element_sets)
+        size = float(np.linalg.norm(rate))
+        turn = {"axis": [v / size for v in rate], "rate": size}
+        elements = set(model.element_sets[name])
+        parts = [part for part in model.parts.values() if not elements.isdisjoint(part.elements)]
+        sides = {deck.sides[n] for n in elements if n in deck.sides}
+        if not parts and not sides:
+            raise Problem(f"{place}: CMROTATE of {name}, which has no elements of the mesh; expected those of the rotor")
+        model.rotors += [(part, turn) for part in parts]
+        of_side.update(dict.fromkeys(() if parts else sides, turn))
+    return of_side
+
+
+def name_parts(deck):
     """A part whose elements are those of a component has its name."""
+    model = deck.model
     for name, elements in list(model.element_sets.items()):
+        elements = [n for n in elements if n not in deck.sides]
         known = [n for n in elements if n in model.elements]
         if len(known) < len(elements):
             model.notes.append(f"{len(elements) - len(known)} of the {len(elements)} elements of {name}, which the mesh has not")
@@ -359,22 +397,42 @@ def supports(deck):
         model.supports.append((name, motions, keys | ({"rotation": values[3:]} if any(values[3:]) else {})))
 
 
-def pairs(deck):
-    """Contact and target elements of one real constant are a contact; its material has the friction."""
+def couple(deck, pair, pilot, surface):
+    """A surface that follows a pilot node: as one rigid body, or in the mean where forces are distributed."""
+    joints, where = deck.model.joints, f"pilot node {pilot}"
+    if deck.options.get((pair["type"], 4), 0) == 1:
+        joints.mean.append((pilot, surface, 1.0, where))
+    else:
+        joints.rigid.append((pilot, surface, " ".join(MOTIONS), where))
+
+
+def pairs(deck, rotors):
+    """Contact and target elements of one real constant are a contact; its material has the friction. Sides that have no faces
+    of solids are gaps to be filled. rotors: turns by the sides of contacts."""
     model, free = deck.model, None
     for real, pair in deck.of_pair.items():
-        if "target" not in pair or "contact" not in pair:
-            model.notes.append(f"the {'target' if 'target' in pair else 'contact'} elements of real constant {real}, which have no other side")
-            continue
         free = free or model.free_faces(model.solids())
         names = []
         for side in ("contact", "target"):
-            faces = [free[corners_of(face)] for face in pair[side] if len(face) in (3, 4, 6, 8) and corners_of(face) in free]
-            if len(faces) < len(pair[side]):
-                model.notes.append(f"{len(pair[side]) - len(faces)} {side} elements of real constant {real}, which lie on no solid")
+            given = [face for face in pair.get(side, []) if side == "contact" or len(face) > 1]  # of one node is a pilot
+            faces = [free[corners_of(face)] for face in given if len(face) in (3, 4, 6, 8) and corners_of(face) in free]
+            dots = [face[0] for face in given if len(face) == 1]
+            if len(faces) + len(dots) < len(given):
+                model.notes.append(f"{len(given) - len(faces) - len(dots)} {side} elements of real constant {real}, which lie on no solid")
+            names.append(model.unused(f"{side}_{real}") if faces or dots else
+                         f"FILL IN [a surface]: real constant {real} of the deck has no {side} elements on faces of solids")
             if faces:
-                names.append(model.unused(f"{side}_{real}"))
                 model.surfaces[names[-1]] = faces
-        if len(names) == 2:
-            friction = deck.constants.get(pair["material"], {}).get("MU", 0.0)
-            model.contacts.append((*names, {"friction": friction}))
+            elif dots:
+                model.node_sets[names[-1]] = list(dict.fromkeys(dots))
+        pilot = [face[0] for face in pair.get("target", ()) if len(face) == 1 and face[0] in model.nodes]
+        if pilot and not names[0].startswith("FILL IN"):
+            couple(deck, pair, pilot[0], names[0])
+            continue
+        if deck.options.get((pair.get("type"), 12), 0) in BONDED and not any(name.startswith("FILL IN") for name in names):
+            model.ties.append(tuple(names))
+            continue
+        keys = {"friction": deck.constants.get(pair["material"], {}).get("MU", 0.0)}
+        for side, more in (("target", {}), ("contact", {"slave": "rotor"})):
+            keys |= {"rotation": rotors[real, side], **more} if (real, side) in rotors else {}
+        model.contacts.append((*names, keys))

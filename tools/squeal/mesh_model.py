@@ -41,6 +41,12 @@ def gmsh_order(kind, code):
     return [*range(corners), *(place[frozenset(edge)] for edge in EDGES["gmsh"][kind])]
 
 
+def order_back(kind):
+    """Where Abaqus's nodes of an element stand in gmsh's order."""
+    order = gmsh_order(kind, "abaqus")
+    return [order.index(i) for i in range(len(order))] if kind in EDGES["gmsh"] else list(range(len(order)))
+
+
 class Part:
     def __init__(self, elements, material=None, thickness=0.0):
         self.elements, self.material, self.thickness = elements, material, thickness
@@ -60,9 +66,11 @@ class Model:
         self.node_sets = {}  # name: nodes
         self.materials = {}  # name: {"young": , "poisson": , "density": , "loss_factor": , "alpha": , "beta": }
         self.loss_factor = 0.0  # of all parts, beside those of their materials
+        self.loss_frequency = 0.0  # [Hz] of their viscous equivalent
         self.supports = []  # (name of a node set, motions, other keys of its table)
         self.ties = []  # (slave, master)
         self.contacts = []  # (slave, master, other keys of its table)
+        self.rotors = []  # (part, other keys of its table)
         self.forces = []  # (name of a node set, keys): on groups; those on nodes of their own are among the joints
         self.pressures = []  # (name of a surface, keys)
         self.masses = []  # (name of a node set, mass)

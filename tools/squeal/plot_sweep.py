@@ -1,16 +1,21 @@
 """Pictures of a sweep: frequency and growth of the followed modes against the number, and a map of stability for two
 numbers; with the motions where they were sought."""
 
+import re
+
 import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 from squeal.plot_basis import frequency_unit, heading, label_row, legend_below, plt, scene_of, those_with
 from squeal.plot_numbers import axis_label, value_of, words_of
+from squeal.common import counted
 from squeal import Missing
 
 COLOURS = ["#c0272d", "#1b6ca8", "#d95f02", "#2e8b57", "#7b3fa0", "#b5893a", "#008b8b", "#d6409f"]
 MARKS = "os^Dvp*X"
+DRIVES = re.compile(r"\b(rate|velocity)\b")  # keys that move a rotor
+NAMED = 3  # points that a caption names
 SAME = 0.01  # of its frequency, within which a followed mode is one of the run's own
 SHADES = ["black", "#1b6ca8", "#7b3fa0"]  # of marks on the yellow and red of a map
 
@@ -368,19 +373,34 @@ def draw_map(results, sweep):
     return figure
 
 
-def signs_of(sweep):
-    """Name and sign of each point's number that has both, such as a speed in both directions; nothing: none has."""
-    for place, key in enumerate(sweep["keys"]):
-        signs = [np.sign(p["values"][place]) for p in sweep["points"]]
-        if min(signs) < 0 < max(signs):
-            return words_of(key, sweep["names"][place]), signs
-    return "", []
+def signs_of(sweep, points):
+    """Name and sign at each point of what turns or pulls the rotor, where both signs occur; nothing: it goes one way."""
+    for place, (key, driven) in enumerate(zip(sweep["keys"], sweep["names"])):
+        if DRIVES.search(f"{key} {driven}"):
+            signs = [np.sign(p["values"][place]) * p["direction"] for p in points]
+            name = words_of(key, driven)
+            break
+    else:
+        signs, name = [p["direction"] for p in points], "rotation"
+    return (name, signs) if signs and min(signs) < 0 < max(signs) else ("", [])
+
+
+def not_counted(sweep):
+    """Sentences about points that are neither quiet nor unstable: nothing touches there, or they failed."""
+    at = lambda p: ", ".join(f"{words_of(key, name)} {value:.5g}" for key, name, value in zip(sweep["keys"], sweep["names"], p["values"]))
+    listed = lambda points, tell: "; ".join(map(tell, points[:NAMED])) + (f"; and {len(points) - NAMED} others" if len(points) > NAMED else "")
+    apart = [p for p in sweep["points"] if p["outcome"] == "converged" and not p.get("closed", 1)]
+    failed = [p for p in sweep["points"] if p["outcome"] != "converged"]
+    found = [f"Nothing touches at {counted(len(apart), 'point')}, not counted: {listed(apart, at)}."] if apart else []
+    reason = lambda p: at(p) + f" ({p.get('reason') or p['outcome']})"
+    return found + ([f"{counted(len(failed), 'point')} failed: {listed(failed, reason)}."] if failed else [])
 
 
 def draw_occurrence(results, sweep):
-    """How many of the points of any numbers squeal, by the frequency of their unstable modes."""
+    """How many of the points of any numbers squeal, by the frequency of their unstable modes. Points where nothing touches are
+    not quiet ones."""
     keys = (*sweep["keys"], "direction")
-    known = [p for p in sweep["points"] if p["outcome"] == "converged"]
+    known = [p for p in sweep["points"] if p["outcome"] == "converged" and p.get("closed", 1)]
     unstable = {}
     for line in results.lines("sweep"):
         if line["growth_rate"] and float(line["growth_rate"]) > 0:
@@ -389,17 +409,20 @@ def draw_occurrence(results, sweep):
     every = [f for own in found for f in own] or [0, 1000]
     size, unit = frequency_unit(max(every))
     edges = np.linspace(0, 1.1 * max(every), 45)
-    name, signs = signs_of({**sweep, "points": known})
+    name, signs = signs_of(sweep, known)
     groups = [(f"{name} above 0", 1), (f"{name} below 0", -1)] if signs else [("", None)]
     figure, ax = plt.subplots(figsize=(8, 4), layout="constrained")
     for (label, sign), colour in zip(groups, COLOURS):
         own = [f for i, f in enumerate(found) if sign is None or signs[i] == sign]
         shares = [100 * sum(any(low <= f < high for f in one) for one in own) / max(len(own), 1) for low, high in zip(edges, edges[1:])]
-        counts = f"{sum(map(bool, own))} of {len(own)} points unstable"
+        counts = f"{sum(map(bool, own))} of {counted(len(own), 'point')} unstable"
         ax.stairs(shares, edges / size, fill=True, alpha=0.6, color=colour, label=f"{label}: {counts}" if label else counts)
-    ax.set(xlabel=f"frequency of unstable modes [{unit}]", ylabel="points [%]", ylim=(0, 100))
+    ax.set(xlabel=f"frequency of unstable modes [{unit}]", ylabel="points that touch [%]", ylim=(0, 100))
     figure.suptitle(heading([results], "occurrence of unstable modes"))
-    legend_below(figure, {label: handle for handle, label in zip(*ax.get_legend_handles_labels())})
+    legend = {label: handle for handle, label in zip(*ax.get_legend_handles_labels())}
+    legend |= {sentence.partition(":")[0]: Line2D([], [], ls="") for sentence in not_counted(sweep)}
+    legend_below(figure, legend)
+    figure.not_counted = not_counted(sweep)
     return figure
 
 
