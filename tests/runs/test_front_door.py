@@ -2,10 +2,11 @@
 
 import json
 import re
+import subprocess
 
 import numpy as np
 import pytest
-from conftest import INPUTS, Run
+from conftest import INPUTS, ROOT, Run
 from test_early_errors import refused
 
 PIN = INPUTS / "pin_on_disc"
@@ -173,6 +174,12 @@ def test_one_dash_is_enough_and_a_misspelt_folder_is_known(squeal, tmp_path):
     (tmp_path / "pin_on_disc").mkdir()
     (tmp_path / "pin_on_disc" / "scene.toml").write_text("")
     refused(squeal(tmp_path / "pin_on_disk", ranks=1), f"did you mean '{tmp_path}/pin_on_disc'")
+
+
+@pytest.mark.parametrize("words, code, said", [(["--help"], 0, "tools/run SCENE"), (["--dry-run"], 1, "--dry-run stands before the scene")])
+def test_the_script_that_runs_a_scene_tells_its_usage(words, code, said):
+    done = subprocess.run([ROOT / "tools" / "run", *words], capture_output=True, text=True, timeout=20)
+    assert done.returncode == code and said in done.stdout + done.stderr
 
 
 def test_a_warning_that_the_motion_settles_disappears(converged):

@@ -295,7 +295,7 @@ def test_all_that_an_input_deck_may_name(tmp_path):
     assert model.supports == [("node_1", ["z", "rx", "ry"], {}), ("Right", ["y"], {"displacement": [0, 0.1, 0]})]
     text = convert(tmp_path / "deck.inp", tmp_path / "out").read_text()
     for words in ('[[tie]]\nslave = "side"\nmaster = "hull"', "[[contact]]\nrotor = \"side\"\nstator = \"Skin\"\nfriction = 0\n",
-                  "1 elements of type SPRINGA", "the set ref", "fixed = \"y\"\ndisplacement = [0, 0.1, 0]",
+                  "1 element of type SPRINGA", "the set ref", "fixed = \"y\"\ndisplacement = [0, 0.1, 0]",
                   "*ELASTIC, TYPE=LAMINA", "young = \"FILL IN [Pa]: the deck has none\""):
         assert words in text, words
 
@@ -497,8 +497,8 @@ def test_what_an_input_deck_has_and_the_mesh_has_not_is_named(tmp_path):
                   "2 layers of *SHELL SECTION", "tie of row (slave) and Top (master): row has no faces",
                   "the surface r (line 32)", "degrees of freedom from 11 on of n",
                   "support of Skins along rx ry rz: its nodes have no rotations",
-                  "1 shells without a *SHELL SECTION",
-                  "1 nodes of the set n", "1 elements of the set mixed that are not there, 77 the first", "the set rod, whose elements"):
+                  "1 shell without a *SHELL SECTION",
+                  "1 node of the set n", "1 element of the set mixed that are not there, 77 the first", "the set rod, whose elements"):
         assert words in notes, words
     assert len(model.notes) == 16 and model.contacts[0][0].startswith("FILL IN [a surface]: r of the deck has no faces")
     assert model.ties == [("side", "Top")] and model.contacts[1] == ("side", "Top", {"friction": 0}) and held(model) == {"n": list(MOTIONS)}

@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from conftest import INPUTS, ROOT
 
 sys.path.insert(0, str(ROOT / "tools"))
 from squeal import plot_basis  # noqa: E402
+from squeal import plot_captions  # noqa: E402
 from squeal import plot_response  # noqa: E402
 from squeal import plot_spectra  # noqa: E402
 from squeal import surface  # noqa: E402

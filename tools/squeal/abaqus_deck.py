@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 
+from squeal.common import counted
 from squeal import abaqus_joining
 from squeal import abaqus_steps
 from squeal.abaqus_nodes import abaqus_nodes, made_explicit
@@ -158,7 +159,7 @@ def name_nodes(model):
 def note_what_is_left_out(deck):
     model = deck.model
     types = list(deck.elements.left_out.values())
-    model.notes += [f"{types.count(name)} elements of type {name}" for name in dict.fromkeys(types)]
+    model.notes += [f"{counted(types.count(name), 'element')} of type {name}" for name in dict.fromkeys(types)]
     found = {}
     for block in deck.blocks:
         if block.name not in READ | SILENT:
@@ -395,7 +396,7 @@ def name_element_sets(model, elements):
             add_surface(model, elements.unnamed.names[key], flat)
     bare = [n for n, (kind, _) in model.elements.items() if kind in FLAT and n in elements.shells and n not in owned]
     if bare:
-        model.notes.append(f"stiffness and mass of {len(bare)} shells without a *SHELL SECTION: they are surfaces")
+        model.notes.append(f"stiffness and mass of {counted(len(bare), 'shell')} without a *SHELL SECTION: they are surfaces")
 
 
 def note_sets(model, elements):
@@ -404,7 +405,7 @@ def note_sets(model, elements):
         name = elements.sets.names[key]
         unknown = [n for n in numbers if n not in model.elements and n not in elements.left_out and n not in elements.lines]
         if unknown and len(unknown) < len(numbers):
-            model.notes.append(f"{len(unknown)} elements of the set {name} that are not there, {unknown[0]} the first")
+            model.notes.append(f"{counted(len(unknown), 'element')} of the set {name} that are not there, {unknown[0]} the first")
         if numbers and not any(n in model.elements or (n in elements.lines and n not in elements.left_out) for n in numbers):
             model.notes.append(f"the set {name}, whose elements are left out or not there")
 

@@ -1,6 +1,7 @@
 """Materials, their axes, and sections of Abaqus and CalculiX."""
 
 import numpy as np
+from squeal.common import counted
 from squeal.deck_files import Problem, number, undefined
 from squeal.mesh_model import FLAT, KINDS, Part
 
@@ -145,5 +146,5 @@ def read_thickness(block, part, deck):
     part.thickness = sum(number(fields[0], place) for place, fields in rows)
     materials = {fields[2].upper() if len(fields) > 2 else "" for _, fields in rows}
     part.material = materials.pop() if len(materials) == 1 else None
-    deck.model.notes.append(f"the {len(rows)} layers of *SHELL SECTION ({deck.line_of(block.place)}): the part has their "
+    deck.model.notes.append(f"the {counted(len(rows), 'layer')} of *SHELL SECTION ({deck.line_of(block.place)}): the part has their "
                        "thickness together" + ("" if part.material else " and no material"))

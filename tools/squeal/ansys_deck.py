@@ -5,6 +5,7 @@ import re
 from collections import Counter
 
 import numpy as np
+from squeal.common import counted
 from squeal.deck_files import Problem, lines_of, number, undefined, whole
 from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part, corners_of
 
@@ -320,7 +321,7 @@ def finish(deck):
     pairs(deck, rotors)
     for section, elements in deck.bolts.items():
         deck.note(f"the bolt of section {section}: {len(elements)} PRETS179, whose two sides have nodes of their own", elements[0][0])
-    model.notes += [f"{count} elements of {name}" for name, count in sorted(deck.other_elements.items())]
+    model.notes += [f"{counted(count, 'element')} of {name}" for name, count in sorted(deck.other_elements.items())]
     if deck.left_out:
         model.notes.append("the commands " + ", ".join(f"{name} ({count})" for name, count in sorted(deck.left_out.items())))
 

@@ -6,6 +6,7 @@ and Nastran those of bricks. An order is here the list of the edges whose mid-si
 """
 
 import numpy as np
+from squeal.common import counted
 from squeal.deck_files import Problem
 from squeal.deck_joints import Joints
 
@@ -168,7 +169,7 @@ class Model:
                 self.notes.append(f"the set {name}{its}, whose nodes no element has")
                 del self.node_sets[name]
             elif lost:
-                self.notes.append(f"{lost} nodes of the set {name}, which no element has")
+                self.notes.append(f"{counted(lost, 'node')} of the set {name}, which no element has")
         self.supports = [support for support in self.supports if support[0] in self.node_sets]
 
     def drop_idle_supports(self):
@@ -251,7 +252,7 @@ class Model:
                     shown = self.unused(name + "_faces")
                     self.call_faces(name, shown)
                     if shown in self.joints.rigid_groups():
-                        self.notes.append(f"{len(wanted - covered)} nodes of {name} in its rigid coupling, which are on no face of it")
+                        self.notes.append(f"{counted(len(wanted - covered), 'node')} of {name} in its rigid coupling, which are on no face of it")
                 self.surfaces[shown] = [free[key] for key in sorted(keys, key=sorted)]
 
     def drop_ties_without_faces(self):

@@ -3,6 +3,7 @@
 import html
 
 import numpy as np
+from squeal.common import counted
 from squeal import number_label
 
 ROWS = 12  # of a table that stand open; the rest is folded away
@@ -180,7 +181,7 @@ def sweep(report):
     at = lambda entry: [values_of(entry), *([rotation(entry)] if both else [])]
     where = [text(keys), *(["rotation"] if both else [])]
     inserted = sum(point["inserted"] for point in found["points"])
-    words = f"{len(found['points'])} points" + (f", of which {inserted} were inserted where modes were unclear or pairs open or close" if inserted else "")
+    words = counted(len(found["points"]), "point") + (f", of which {inserted} were inserted where modes were unclear or pairs open or close" if inserted else "")
     if found["followed_modes"]:
         words += (f"; {found['followed_modes']} modes followed with a MAC of at least {min(found['least_mac'], found['least_mac_across']):.2f}, "
                   f"{found['lost_modes']} lost on the way")
