@@ -275,6 +275,17 @@ def test_bonded_and_pilot_contacts_of_ansys(tmp_path, pilot, option, table):
     assert len(scene[table]) == 1 and "contact" not in scene and left_out == []
 
 
+@pytest.mark.parametrize("constants", ["R,9,2,2,2,.1,.2,.3\n", "RLBLOCK,       1,       9,       6,       7\n(2i8,6g16.9)\n(7g16.9)\n"
+                                       + f"{9:8d}{6:8d}" + "".join(f"{v:16.9G}" for v in (2, 2, 2, .1, .2, .3)) + "\n"])
+def test_masses_of_ansys(tmp_path, constants):
+    """At the pilot of a surface, with its inertia, and at a node of an element, which has none."""
+    rows = [*BRICK_ROWS, (3, 3, 2, 7, [17]), (4, 3, 3, 7, [9, 12, 11, 10]), (5, 1, 5, 9, [17]), (6, 1, 6, 9, [13])]
+    deck = cdb(rows, constants + "KEYOPT,6,3,2\n", [*AT, (0.5, 0.5, 3)]).replace("ET,4,186\n", "ET,4,186\nET,5,21\nET,6,21\n")
+    scene, left_out = converted(tmp_path, deck, "deck.cdb")
+    assert scene["rigid_body"][0]["mass"] == 2 and scene["rigid_body"][0]["inertia"] == [0.1, 0.2, 0.3, 0, 0, 0]
+    assert scene["mass"] == [{"on": "node_13", "mass": 2}] and left_out == []
+
+
 def test_nodes_with_one_force_are_a_group(tmp_path):
     """Of commands and of cards: the sum of their forces acts on all; so are nodes of a line each that are held alike."""
     more = "".join(f"F,{n},FZ,-8.\n" for n in (13, 14, 15, 16)) + "F,9,FX,3.\n"
@@ -299,15 +310,16 @@ WRONG_NAMES = {
                  ("*CHANGE FRICTION, INTERACTION=rub\n*FRICTION\n0.1\n", "interaction 'RUB'")],
     "deck.bdf": [("CONTACT,1,0.5,12,11\n", "surface '12'"), ("SURF,11,ELFACE,,,,,,\n,1,5,7\nSURF,12,ELFACE,,,,,,\n,2,9,11\nCONTACT,1,50,12,11\n", "property '50'"),
                  ("CBAR,9,3,100,101,1.,0.,0.\n", "property '3'"), ("LOAD,3,1.,1.,7\nFORCE,2,13,,1.,1.,0.,0.\n", "set '7'"), ("CELAS1,9,3,100,3\n", "property '3'")],
-    "deck.cdb": [("CMROTATE,DISK,,,10\n", "component of elements 'DISK'.*known are DISC")],
+    "deck.cdb": [("R,5,1,1,1\n", "MASS21: the real constant '9'"), ("CMROTATE,DISK,,,10\n", "component of elements 'DISK'.*known are DISC")],
 }
 
 
 @pytest.mark.parametrize("name, more, words", [(name, *case) for name, cases in WRONG_NAMES.items() for case in cases])
 def test_what_a_deck_names_and_does_not_define_is_refused(tmp_path, name, more, words):
     """With its line, the nearest name and those that are there: nothing of the kind is lost and called complete."""
+    mass = [(7, 1, 5, 9, [13])] if "R,5" in more else []
     component = "CMBLOCK,DISC,ELEM,       1\n(8i10)\n         1\n"
-    (tmp_path / name).write_text({"deck.inp": BRICKS + more, "deck.bdf": ("LOAD = 3\nBEGIN BULK\n" if "LOAD" in more else "") + GRIDS + more, "deck.cdb": cdb(BRICK_ROWS, component + more)}[name])
+    (tmp_path / name).write_text({"deck.inp": BRICKS + more, "deck.bdf": ("LOAD = 3\nBEGIN BULK\n" if "LOAD" in more else "") + GRIDS + more, "deck.cdb": cdb(mass + BRICK_ROWS, component + more).replace("ET,4", "ET,5,21\nET,4")}[name])
     with pytest.raises(TOOL.Problem, match=f"line .*{words}" if "LOAD" not in more else words):
         TOOL.read_deck(tmp_path / name)
 

@@ -5,16 +5,16 @@ import re
 from collections import Counter
 
 import numpy as np
+from squeal import ansys_joining
 from squeal.common import counted
-from squeal.deck_files import Problem, lines_of, number, undefined, whole
-from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part, corners_of
+from squeal.deck_files import Problem, lines_of, number, whole
+from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part
 
 # squeal's kinds by element type and by the number of different nodes
 SOLIDS = {45: 8, 65: 8, 185: 8, 190: 8, 95: 20, 186: 20, 92: 10, 187: 10, 285: 4}
 SHELLS = {63: 4, 181: 4, 43: 4}
 TARGETS, CONTACTS = {169, 170}, {171, 172, 173, 174, 175, 177}
 SKINS = {152: 4, 154: 8}
-BONDED = (3, 5, 6)  # values of the option 12 of contact elements
 MOTION_OF = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "rx", "ROTY": "ry", "ROTZ": "rz"}
 FORCE_OF = {name: i for i, name in enumerate(("FX", "FY", "FZ", "MX", "MY", "MZ"))}
 ELASTIC = {"EX": "young", "PRXY": "poisson", "NUXY": "poisson", "DENS": "density", "DMPR": "loss_factor", "BETD": "beta", "ALPD": "alpha"}
@@ -24,7 +24,7 @@ WEDGE_OF = [0, 1, 2, 4, 5, 6]
 TET_OF = [0, 1, 2, 4]
 SILENT = set("/COM /NOPR /GOPR /PREP7 /TITLE /SOLU /GO /OUTPUT /UNITS /VIEW /AUTO FINISH NUMOFF *IF *ELSE *ENDIF *SET DOF N R5.3 MPTEMP "
              "EXTOPT TREF IRLF BFUNIF ACEL OMEGA DOMEGA CGLOC CGOMEGA DCGOMG KUSE TIME ALPHAD BETAD DMPRAT DMPSTR CRPLIM NCNV "
-             "NEQIT ERESX TOFFST RLBLOCK SECTYPE SECBLOCK ANTYPE ETBLOCK LSCLEAR FCUM DELTIM KBC SHPP SHELL".split())
+             "NEQIT ERESX TOFFST SECTYPE SECBLOCK ANTYPE ETBLOCK LSCLEAR FCUM DELTIM KBC SHPP SHELL".split())
 
 
 class Deck:
@@ -36,6 +36,7 @@ class Deck:
         self.constants = {}  # of materials by number and label
         self.of_pair = {}  # faces and kind by the number of a real constant: "target", "contact"
         self.sides = {}  # (real constant, "target" or "contact") by the numbers of such elements
+        self.reals, self.masses = {}, []  # values by real constant; (place, node, real constant, type) of MASS21
         self.options = {}  # of element types, by type and number of the option
         self.turning = []  # (name of a component, vector of its rate, place)
         self.frictions = {}
@@ -195,7 +196,7 @@ def add_element(deck, place, label, attributes, nodes):
     elif kind == 179:
         deck.bolts.setdefault(section, []).append((place, nodes))
     elif kind == 21:
-        deck.other_elements["MASS21"] += 1
+        deck.masses.append((place, nodes[0], real, kind_number))
     else:
         deck.other_elements[f"type {kind}"] += 1
 
@@ -231,7 +232,24 @@ def read_component(words, lines, deck):
         deck.model.element_sets[name] = items
 
 
-BLOCKS = {"NBLOCK": read_nodes, "EBLOCK": read_elements, "CMBLOCK": read_component}
+def read_reals(words, lines, deck):
+    """RLBLOCK: of each set its number, its count and six values, then seven a line."""
+    if not lines.more():
+        raise Problem(f"{lines.place()}: RLBLOCK without a format")
+    first = widths_of(lines.next(), lines.place())
+    more = widths_of(lines.next(), lines.place()) if lines.more() else first
+    for _ in range(whole(words[1] if len(words) > 1 else "", lines.place())):
+        fields = fields_of(lines.next(), first) if lines.more() else []
+        place = lines.place()
+        if len(fields) < 2:
+            raise Problem(f"{place}: RLBLOCK ends before its {words[1]} sets; expected a set's number, its count and its values")
+        values = [number(field or "0", place) for field in fields[2:]]
+        while len(values) < whole(fields[1], place) and lines.more():
+            values += [number(field or "0", lines.place()) for field in fields_of(lines.next(), more)] or [0.0]
+        deck.reals[whole(fields[0], place)] = values
+
+
+BLOCKS = {"RLBLOCK": read_reals, "NBLOCK": read_nodes, "EBLOCK": read_elements, "CMBLOCK": read_component}
 
 # ---- commands
 
@@ -292,6 +310,11 @@ def key_option(words, place, deck):
         deck.options[whole(words[1], place), whole(words[2], place)] = whole(words[3] or "0", place)
 
 
+def real_constants(words, place, deck):
+    """R,set,value,…; those of contacts are penalties, which a scene has not."""
+    deck.reals[whole(words[1] if len(words) > 1 else "", place)] = [number(word or "0", place) for word in words[2:8]]
+
+
 def rotation(words, place, deck):
     """CMROTATE,component,x,y,z: the rate about the global axes of the elements that turn."""
     rate = [number(word or "0", place) for word in (words[2:] + ["0"] * 3)[:3]]
@@ -299,7 +322,7 @@ def rotation(words, place, deck):
         deck.turning.append((words[1] if len(words) > 1 else "", rate, place))
 
 
-COMMANDS = {"CMROTATE": rotation, "KEYOPT": key_option, "ET": element_type, "MPDATA": material_data, "MP": material_data, "D": support, "F": force, "CE": equation, "ACEL": gravity}
+COMMANDS = {"R": real_constants, "CMROTATE": rotation, "KEYOPT": key_option, "ET": element_type, "MPDATA": material_data, "MP": material_data, "D": support, "F": force, "CE": equation, "ACEL": gravity}
 
 
 # ---- what the whole deck makes
@@ -315,33 +338,16 @@ def finish(deck):
     for (material, section), elements in deck.bodies.items():
         name = f"material_{material}" + (f"_shells_{section}" if section and several[material] > 1 else "")
         model.parts[model.unused(name)] = Part(elements, material)
-    rotors = rotors_of(deck)
+    rotors = ansys_joining.rotors_of(deck)
     name_parts(deck)
     supports(deck)
-    pairs(deck, rotors)
+    ansys_joining.pairs(deck, rotors)
+    ansys_joining.masses(deck)
     for section, elements in deck.bolts.items():
         deck.note(f"the bolt of section {section}: {len(elements)} PRETS179, whose two sides have nodes of their own", elements[0][0])
     model.notes += [f"{counted(count, 'element')} of {name}" for name, count in sorted(deck.other_elements.items())]
     if deck.left_out:
         model.notes.append("the commands " + ", ".join(f"{name} ({count})" for name, count in sorted(deck.left_out.items())))
-
-
-def rotors_of(deck):
-    """Rotations of the parts that a component has elements of, or of the sides of contacts where it has those alone."""
-    model, of_side = deck.model, {}
-    for name, rate, place in deck.turning:
-        if name not in model.element_sets:
-            raise undefined(place, "CMROTATE: the component of elements", name, model.element_sets)
-        size = float(np.linalg.norm(rate))
-        turn = {"axis": [v / size for v in rate], "rate": size}
-        elements = set(model.element_sets[name])
-        parts = [part for part in model.parts.values() if not elements.isdisjoint(part.elements)]
-        sides = {deck.sides[n] for n in elements if n in deck.sides}
-        if not parts and not sides:
-            raise Problem(f"{place}: CMROTATE of {name}, which has no elements of the mesh; expected those of the rotor")
-        model.rotors += [(part, turn) for part in parts]
-        of_side.update(dict.fromkeys(() if parts else sides, turn))
-    return of_side
 
 
 def name_parts(deck):
@@ -396,44 +402,3 @@ def supports(deck):
         values = [dict(held).get(m, 0.0) for m in MOTIONS]
         keys = {"displacement": values[:3]} if any(values[:3]) else {}
         model.supports.append((name, motions, keys | ({"rotation": values[3:]} if any(values[3:]) else {})))
-
-
-def couple(deck, pair, pilot, surface):
-    """A surface that follows a pilot node: as one rigid body, or in the mean where forces are distributed."""
-    joints, where = deck.model.joints, f"pilot node {pilot}"
-    if deck.options.get((pair["type"], 4), 0) == 1:
-        joints.mean.append((pilot, surface, 1.0, where))
-    else:
-        joints.rigid.append((pilot, surface, " ".join(MOTIONS), where))
-
-
-def pairs(deck, rotors):
-    """Contact and target elements of one real constant are a contact; its material has the friction. Sides that have no faces
-    of solids are gaps to be filled. rotors: turns by the sides of contacts."""
-    model, free = deck.model, None
-    for real, pair in deck.of_pair.items():
-        free = free or model.free_faces(model.solids())
-        names = []
-        for side in ("contact", "target"):
-            given = [face for face in pair.get(side, []) if side == "contact" or len(face) > 1]  # of one node is a pilot
-            faces = [free[corners_of(face)] for face in given if len(face) in (3, 4, 6, 8) and corners_of(face) in free]
-            dots = [face[0] for face in given if len(face) == 1]
-            if len(faces) + len(dots) < len(given):
-                model.notes.append(f"{len(given) - len(faces) - len(dots)} {side} elements of real constant {real}, which lie on no solid")
-            names.append(model.unused(f"{side}_{real}") if faces or dots else
-                         f"FILL IN [a surface]: real constant {real} of the deck has no {side} elements on faces of solids")
-            if faces:
-                model.surfaces[names[-1]] = faces
-            elif dots:
-                model.node_sets[names[-1]] = list(dict.fromkeys(dots))
-        pilot = [face[0] for face in pair.get("target", ()) if len(face) == 1 and face[0] in model.nodes]
-        if pilot and not names[0].startswith("FILL IN"):
-            couple(deck, pair, pilot[0], names[0])
-            continue
-        if deck.options.get((pair.get("type"), 12), 0) in BONDED and not any(name.startswith("FILL IN") for name in names):
-            model.ties.append(tuple(names))
-            continue
-        keys = {"friction": deck.constants.get(pair["material"], {}).get("MU", 0.0)}
-        for side, more in (("target", {}), ("contact", {"slave": "rotor"})):
-            keys |= {"rotation": rotors[real, side], **more} if (real, side) in rotors else {}
-        model.contacts.append((*names, keys))
