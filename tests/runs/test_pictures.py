@@ -353,8 +353,8 @@ def test_points_where_nothing_touches_or_that_failed_are_not_quiet_ones():
     figure = plot_sweep.draw_occurrence(Swept(), sweep)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels[:2] == ["speed above 0: 1 of 1 point unstable", "speed below 0: 0 of 1 point unstable"]  # not the offset, which has both signs too
-    assert figure.not_counted == ["Nothing touches at 1 point, not counted: load -5, speed 2, offset 1.",
-                                  "1 point failed: load 7, speed 0, offset 1 (nothing drives a pair there)."]
+    assert figure.not_counted == ["Nothing touches at 1 point, not counted: load -5, speed 2, mesh offset 1.",
+                                  "1 point failed: load 7, speed 0, mesh offset 1 (nothing drives a pair there)."]
     caption = plot_captions.of_sweep([], figure)
     assert all(sentence in caption for sentence in figure.not_counted)
 
