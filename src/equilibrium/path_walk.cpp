@@ -86,6 +86,8 @@ bool advance_to(const PathProblem& problem, const Place& place, double size, Pat
   for (std::size_t pair = 0; pair < slip.pairs(); ++pair) std::ranges::fill(slip.tangential(pair), 0.);
   StickSlipState guess = start;
   if (walk.rate.r.size() > 0) guess = {start.r + size * walk.rate.r, start.w + size * walk.rate.w};
+  constexpr double rounding = 1e-9; // of reactions: where the rate leads to none, it tells no statuses
+  if (guess.r.lpNorm<Eigen::Infinity>() <= rounding * start.r.lpNorm<Eigen::Infinity>()) guess = start;
   StickSlipSolution found = solve_stick_slip(of, friction, q, guess);
   walk.iterations += found.iterations;
   if (!found.converged) return false;
