@@ -43,15 +43,8 @@ double steps_of_transient(const TransientSettings& transient)
 double points_of(const SweepSettings& sweep)
 {
   double points = static_cast<double>(std::max(sweep.values.size(), sweep.design.size()));
-  if (points == 0) points = std::accumulate(sweep.points.begin(), sweep.points.end(), 1., std::multiplies<>());
-  if (sweep.samples > 0) points = sweep.samples;
+  if (points == 0) points = sweep.points;
   return sweep.directions == SweepDirections::both ? 2 * points : points;
-}
-
-/// Motions that a sweep seeks at most: one a point.
-double motions_of(const Scene& scene)
-{
-  return scene.sweep && scene.sweep->stages == SweepStages::cycle ? points_of(*scene.sweep) : 0;
 }
 
 double steps_of_period(const Scene& scene)
@@ -62,13 +55,11 @@ double steps_of_period(const Scene& scene)
 double steps_of(const Scene& scene, const ProgramOptions& options)
 {
   double steps = steps_of_transient(scene.transient);
-  const double motions = motions_of(scene);
-  if (!scene.cycle.enabled && motions == 0) return steps;
+  if (!scene.cycle.enabled) return steps;
   const double a_period = steps_of_period(scene);
   const double cycle = a_period * std::min(usual_periods, static_cast<double>(options.cycle.shooting.max_periods));
   const double starts = scene.cycle.starts, points = scene.branch ? scene.branch->points : 0;
-  const double of_scene = scene.cycle.enabled ? cycle * (1 + starts + points) + a_period * scene.cycle.free_periods : 0;
-  return steps + of_scene + motions * (cycle + a_period * scene.cycle.free_periods);
+  return steps + cycle * (1 + starts + points) + a_period * scene.cycle.free_periods;
 }
 
 double sum_of_ranks(double value, MPI_Comm comm)
@@ -232,9 +223,8 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)
     add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient));
-  const double cycle = memory_of_cycle(sizes, scene.fidelity, in_factor, free);
-  if (scene.cycle.enabled) add(Stage::cycle, cycle);
-  if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)) + (motions_of(scene) > 0 ? cycle : 0));
+  if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity, in_factor, free));
+  if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)));
   if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));
   forecast.steps = steps_of(scene, options);
   return forecast;

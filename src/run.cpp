@@ -110,7 +110,7 @@ void refuse_undriven_pairs(const Scene& scene, const Interface& interface)
       throw Error(scene.file.string() + ": " + stage + " does not know pairs without a drive yet, and " + contact +
                   " has some: " + remedy + ", or give the contact a velocity, or friction = 0");
   };
-  refuse(scene.sweep && scene.sweep->stages != SweepStages::equilibrium, "[sweep] of modes or cycles",
+  refuse(scene.sweep && scene.sweep->stages != SweepStages::equilibrium, "[sweep] of modes",
          "set sweep.stages = \"equilibrium\"");
   refuse(scene.sensitivity.has_value(), "[sensitivity]", "take it out");
   refuse(scene.robustness.has_value(), "[robustness]", "take it out");

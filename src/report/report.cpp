@@ -106,7 +106,6 @@ void write_results(const Report& report, const Scene& scene, const Model& nodes,
                {
                  write_history(report, scene, output / word(ResultFile::history));
                  write_list(ResultFile::sweep, sweep_modes(report.sweep, scene, Content::results));
-                 write_list(ResultFile::sweep_motions, sweep_motions(report.sweep, scene));
                  write_list(ResultFile::robustness, robustness_samples(report.robustness, scene, Content::results));
                });
   write_fields(report, scene, nodes, output, comm);

@@ -12,9 +12,6 @@ Result results_of(const Report& report, const Scene& scene);
 /// A group for each mode of each point of a sweep, one without a mode for a point that failed.
 Result sweep_modes(const Sweep& sweep, const Scene& scene, Content content);
 
-/// A group for each motion of a sweep.
-Result sweep_motions(const Sweep& sweep, const Scene& scene);
-
 /// A group for each random sample.
 Result robustness_samples(const Robustness& robustness, const Scene& scene, Content content);
 

@@ -366,8 +366,7 @@ private:
   void check_cycle() const
   {
     const CycleSettings& c = scene_.cycle;
-    const bool sought = c.enabled || (scene_.sweep && scene_.sweep->stages == SweepStages::cycle);
-    if (c.start.kind == CycleStartKind::transient && sought && !scene_.transient.enabled)
+    if (c.start.kind == CycleStartKind::transient && c.enabled && !scene_.transient.enabled)
       fail(&c.start, "[cycle] start = 'transient' needs the [transient] that it starts from the end of");
     constexpr double of_rounding = 1e-14; // what the steps of a period leave of the fluctuation
     if (c.tolerance > 0 && c.tolerance < of_rounding)

@@ -98,22 +98,17 @@ SceneKeys keys_of(BranchSettings& b)
 SceneKeys keys_of(SweepSettings& s)
 {
   return {
-      {"key", &s.key, "texts",
-       "number of the structure, its contact or its loads, as --set names it, or a list of two"},
-      {"from", &s.from, "-",
-       "its first value, in its own unit; a list of two for two numbers, here and in the next lines"},
+      {"key", &s.key, "texts", "number of the structure, its contact or its loads, as --set names it"},
+      {"from", &s.from, "-", "its first value, in its own unit"},
       {"to", &s.to, "-", "its last value"},
       {"points", &s.points, "-", "number of values from the first to the last", positive},
-      {"values", &s.values, "-", "list of values of a single number, instead of the grid"},
+      {"values", &s.values, "-", "list of values, instead of the grid"},
       {"table", &s.table, "path",
-       "CSV file of points instead of all these: a head of keys, such as numbers.clamp, and a line of values a point",
+       "CSV file of points instead of all these: a head of keys, such as numbers.clamp, and a line of values a point. "
+       "Modes are named by the first one's",
        file},
-      {"samples", &s.samples, "-",
-       "number of random points of the ranges, evenly distributed, instead of the grid; 0: none", not_negative},
-      {"seed", &s.seed, "-", "seed of the random points", not_negative},
       {"directions", choice_of(s.directions), "word", "one direction of rotation, that of the scene, or both"},
-      {"stages", choice_of(s.stages), "word",
-       "at each point the equilibrium alone, or the modes too, or also the cycle where modes grow"},
+      {"stages", choice_of(s.stages), "word", "at each point the equilibrium alone, or the modes too"},
   };
 }
 
@@ -150,8 +145,6 @@ SceneKeys keys_of(RobustnessSettings& r)
 {
   return {
       {"samples", &r.samples, "-", "number of random scenes", positive},
-      {"checks", &r.checks, "-", "number of them, the first ones, that are computed by the full problem as well",
-       not_negative},
       {"seed", &r.seed, "-", "seed of the random numbers", not_negative},
       {"confidence", &r.confidence, "-", "confidence of the intervals of the probabilities", fraction},
   };

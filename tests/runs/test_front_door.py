@@ -96,7 +96,7 @@ def test_a_number_is_random_and_leads_a_branch(converged, tmp_path):
         (folder / "scene.toml").write_text(content)
         reports.append(converged(folder, "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=60", "--set",
                                  f"branch.key={key}", "--set", "branch.from=0.29", "--set", "branch.to=0.31", "--set",
-                                 "branch.points=3", "--set", "robustness.samples=20", "--set", "robustness.checks=2", "--set",
+                                 "branch.points=3", "--set", "robustness.samples=20", "--set",
                                  f"uncertain=[{{key='{key}', deviation=0.05}}]", ranks=1).report)
     by_key, by_name = reports
     assert by_key["robustness"]["any"]["probability"] == by_name["robustness"]["any"]["probability"]

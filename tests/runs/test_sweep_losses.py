@@ -154,12 +154,8 @@ FRICTION = "{key='friction.coefficient', distribution='uniform', from=0.3, to=0.
     (ALL, [LOSSES, COMPLIANCE, RATE, FRICTION]),
 ], ids=["losses", "compliance", "spin", "all"])
 def test_random_numbers_are_single_runs(scene, numbers, converged):
-    """Growth within 1e-3 of |lambda|, as it is asked for; the losses move it by up to a hundredth."""
-    run = converged(*scene, *random(*numbers, samples=8, checks=4), ranks=1)
-    robustness = run.report["robustness"]
-    assert robustness["growth_error"] < 1e-3
-    assert all(check["known"] for check in robustness["checks"])
-    assert any(check["unstable_modes"] > 0 for check in robustness["checks"])
+    """Growth within 1e-3 of |lambda|; the losses move it by up to a hundredth."""
+    run = converged(*scene, *random(*numbers, samples=8), ranks=1)
     row = max(samples_of(run), key=lambda row: float(row["growth_rate"]))
     changes = [word for key, value in row.items() if "." in key for word in set_to(key, float(value))]
     single = lambdas(converged(*scene, *changes, ranks=1).report)
@@ -169,7 +165,9 @@ def test_random_numbers_are_single_runs(scene, numbers, converged):
 
 def test_a_number_may_bring_what_the_medians_lack(converged):
     """At the median nothing spins."""
-    run = converged(*SPINNING, *random("{key='part.disc.rotation.rate', distribution='uniform', from=-100, to=100}", samples=4,
-                                       checks=4), ranks=1)
-    robustness = run.report["robustness"]
-    assert robustness["growth_error"] < 1e-3 and robustness["wrong_verdicts"] == 0
+    run = converged(*SPINNING, *random("{key='part.disc.rotation.rate', distribution='uniform', from=-100, to=100}", samples=4),
+                    ranks=1)
+    for row in samples_of(run):
+        single = converged(*SPINNING, *set_to("part.disc.rotation.rate", float(row["part.disc.rotation.rate"])), ranks=1).report
+        found = complex(float(row["growth_rate"]), 2 * np.pi * float(row["frequency_hz"]))
+        assert min(abs(one - found) for one in lambdas(single)) < 1e-4 * abs(found)

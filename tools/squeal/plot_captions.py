@@ -78,8 +78,8 @@ def of_sweep(runs, figure):
     return sentences(("Largest growth rate over the plane of two numbers.", maps), ("How many points have an unstable mode near a frequency.", counts),
                      ("Frequency and growth of the modes against a number of the scene.", not maps and not counts),
                      ("Coloured modes are unstable somewhere, grey ones nowhere.", not maps and "grows most" in drawn),
-                     ("Dotted lines are thresholds.", "threshold, with its value" in drawn), ("Larger marks are thresholds, one mark a mode.", "threshold of mode" in drawn),
-                     ("Crosses are points that failed.", "point that failed" in drawn), ("Black marks are motions that were found there.", "cycle, " in drawn or "settled motion" in drawn))
+                     ("Dotted lines are thresholds.", "threshold, with its value" in drawn),
+                     ("Crosses are points that failed.", "point that failed" in drawn))
 
 
 def of_thresholds(runs, figure):

@@ -166,22 +166,19 @@ enum class SweepStages
 {
   equilibrium,
   modes,
-  cycle, // or the settled motion, where modes grow
 };
 
-template <> inline constexpr std::array words_of<SweepStages> = {"equilibrium", "modes", "cycle"};
+template <> inline constexpr std::array words_of<SweepStages> = {"equilibrium", "modes"};
 
-/// Stability at many values of one number of the scene, or of two.
+/// Stability at many values of one number of the scene, or at design points.
 struct SweepSettings
 {
-  std::vector<std::string> key;              // of the numbers, as overrides name them
-  std::vector<double> from, to;              // in the keys' units, one a key
-  std::vector<int> points{11};               // [-] of the grid, one a key
-  std::vector<double> values;                // of a single key, instead of a grid
+  std::vector<std::string> key;              // of the number, as overrides name it; of a table all of them
+  double from = 0, to = 0;                   // in the key's unit
+  int points = 11;                           // [-] of the grid
+  std::vector<double> values;                // instead of a grid
   std::filesystem::path table{};             // CSV file of design points instead, a column a key; absolute
   std::vector<std::vector<double>> design{}; // its points; no key of its own
-  int samples = 0;                           // [-] number of random points of the ranges, instead of a grid; 0: none
-  int seed = 1;                              // [-] of the random points
   SweepDirections directions{};              // of rotation
   SweepStages stages = SweepStages::modes;
 };
@@ -205,7 +202,6 @@ struct Change
 struct RobustnessSettings
 {
   int samples = 1000;       // [-] number of random scenes
-  int checks = 20;          // [-] number of them that are computed by the full problem as well
   int seed = 1;             // [-] of the random numbers
   double confidence = 0.95; // [-] of the intervals of the probabilities
 };
