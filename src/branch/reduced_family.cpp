@@ -325,12 +325,6 @@ Owned<Vec> ReducedFamily::lifted(const VectorXd& state) const
   return result;
 }
 
-Preconditioner ReducedFamily::lifted_preconditioner(double period, const VectorXd& state)
-{
-  lifted_correction_ = monodromy_correction(at_->map, period, {state.head(own_.size()), state.tail(own_.size())});
-  return preconditioner_of(lifted_correction_, coordinates_in(own_, problem_.sliding.structure));
-}
-
 SlowMotions ReducedFamily::slow_motions(double period, Vec start)
 {
   ReducedMap& map = at_->map;

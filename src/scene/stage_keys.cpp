@@ -88,10 +88,6 @@ SceneKeys keys_of(BranchSettings& b)
       {"from", &b.from, "-", "its value at one end of the branch, in its own unit", required},
       {"to", &b.to, "-", "its value at the other end; the scene's own value is between them", required},
       {"points", &b.points, "-", "number of points if this number alone changed along the branch", positive},
-      {"corrections", &b.corrections, "-",
-       "number of points, evenly spread, where the full model's cycle is found beside a reduced model's; none where "
-       "the full model is followed",
-       not_negative},
   };
 }
 

@@ -193,10 +193,9 @@ def data_sets_of(file):
 # Written with a verdict that is unstable or undecided, or by Arnoldi in place of a projection: no run here ends so.
 UNLESS_STABLE = {"cycle.multipliers.crossing", "cycle.multipliers.would_decide", "cycle.multipliers.refusal"}
 # Written of points of a sweep that fail.
-UNLESS_STABLE |= {"sweep.points[].reason", "sweep.points[].motion.reason"}
-# Written of branches with events, where a stable cycle stands beside a stable equilibrium, and of reduced models, which
-# test_branch reads.
-OF_SOME_BRANCHES = re.compile(r"branch\.((events|coexistence)\[\]\.\w+|reduction\..+|points\[\]\.full_residual|not_reduced)")
+UNLESS_STABLE |= {"sweep.points[].reason"}
+# Written of branches with events, and of reduced models, which test_branch reads.
+OF_SOME_BRANCHES = re.compile(r"branch\.(events\[\]\.\w+|reduction\..+|points\[\]\.full_residual|not_reduced)")
 # Written of pairs without a drive, which test_undriven and test_joint_cycles read.
 UNLESS_STABLE |= {f"equilibrium.undriven_pairs.{key}" for key in ("stick", "slip", "open", "at_limit", "increments", "change", "index",
                                                                   "reciprocal_condition")} | {"transient.joint_work[]", "modes.dependent_rows", "estimate.slip_amplitude",

@@ -148,7 +148,6 @@ struct BranchSettings
   std::string key;         // of the number, as overrides name it
   double from = 0, to = 0; // in the key's unit
   int points = 30;         // [-] number of points if the number alone changed along the branch
-  int corrections = 0;     // [-] number of points of a reduced model's branch that the full one corrects
   double own = 0;          // the scene's own value of the number, which the branch starts from; no key of its own
 };
 
