@@ -313,7 +313,6 @@ private:
                                 : "every [[part]] has an alpha or beta of its own; take one of them out";
     const auto refuse = [&](const void* member, const char* key)
     { fail(member, "[damping] " + std::string(key) + " has no effect: " + why); };
-    if (!damping.measured.empty()) refuse(&damping.measured, "measured");
     if (damping.alpha != 0) refuse(&damping.alpha, "alpha");
     if (damping.beta != 0) refuse(&damping.beta, "beta");
   }

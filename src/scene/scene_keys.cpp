@@ -329,10 +329,6 @@ SceneKeys keys_of(RayleighDamping& d)
        "where loss factors have their viscous equivalent eta/omega K in time steps and in the estimate; modes take "
        "complex stiffness",
        not_negative, damping},
-      {"measured", &d.measured, "table",
-       "instead of alpha and beta, which are fitted to damping ratios measured on modes: [[frequency in Hz, ratio], "
-       "...], at least two, frequencies rising",
-       positive},
   };
 }
 

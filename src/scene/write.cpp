@@ -67,12 +67,6 @@ private:
     return print(text.empty() ? no_motions : text);
   }
 
-  std::string print(const MeasuredRatio& measured) const
-  {
-    const std::string frequency = print(measured.frequency_hz), ratio = print(measured.ratio);
-    return "[" + frequency + ", " + ratio + "]";
-  }
-
   /// A vector, or a list of any values.
   template <std::ranges::range List> std::string print(const List& list) const
   {

@@ -165,7 +165,7 @@ class Writer:
             else:
                 self.add(f"SOLID SECTION, ELSET={name}, MATERIAL=of_{name}{orientation}")
             self.notes += [f"rotation of part {name}"] if "rotation" in part else []
-        self.notes += [f"{key} of [damping]" for key in ("measured", "loss_frequency") if key in self.scene.get("damping", {})]
+        self.notes += ["loss_frequency of [damping]"] * ("loss_frequency" in self.scene.get("damping", {}))
         self.notes += [f"{key} of [friction]" for key in ("direction_damping", "slipped_pairs_stick") if key in self.scene.get("friction", {})]
 
     def new_node(self, name, at):
