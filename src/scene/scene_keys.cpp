@@ -284,9 +284,7 @@ SceneKeys keys_of(InitialMotion& m)
 SceneKeys keys_of(Tie& t)
 {
   return {
-      {"slave", &t.slave, "text",
-       "named surface whose nodes follow: the finer or softer side, and the smaller one; or a named curve, the edge of "
-       "a shell",
+      {"slave", &t.slave, "text", "named surface whose nodes follow: the finer or softer side, and the smaller one",
        required},
       {"master", &t.master, "text", "named surface that they follow", required},
       {"reach", &t.reach, "m",
