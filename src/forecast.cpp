@@ -11,8 +11,6 @@
 #include "squeal/reduction/reduced_model.hpp"
 
 #include <algorithm>
-#include <functional>
-#include <numeric>
 
 namespace squeal
 {

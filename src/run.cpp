@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <optional>
 #include <utility>
 
 namespace squeal
@@ -160,7 +159,7 @@ ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results,
     report.contacts = contact_resultants(model.interface, point.equilibrium.reactions, scene.contacts);
     check(VecNorm(point.equilibrium.u, NORM_INFINITY, &report.displacement));
     report.equilibrium_probes = probe_values(model.probes, point.equilibrium.u);
-    add_shifts(scene, model, report.equilibrium_probes, comm);
+    add_shifts(scene, model, report.equilibrium_probes);
     for (const TightBolt& bolt : model.structure.bolts)
       report.bolts.push_back({bolt.name, tension_of(bolt, point.equilibrium.u), bolt.shortening});
   }

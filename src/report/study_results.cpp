@@ -74,12 +74,6 @@ void add_equilibrium_point(Entry out, const EquilibriumStability& equilibrium)
   out.add("frequency_hz", "Hz", "frequency of that mode", equilibrium.frequency_hz);
 }
 
-void add_range(Entry out, const ParameterRange& range)
-{
-  out.show("from", "unit of the key", "least value with a stable cycle beside a stable equilibrium", range.from);
-  out.show("to", "unit of the key", "greatest value; undecided points do not end the range", range.to);
-}
-
 /// An eigenvalue as growth rate and frequency.
 void add_eigenvalue(Entry out, const char* meaning, std::complex<double> lambda)
 {

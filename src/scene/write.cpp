@@ -75,11 +75,6 @@ private:
     return "[" + text + "]";
   }
 
-  std::string print(const std::vector<int>& list) const
-  {
-    return list.size() == 1 ? print(list.front()) : print<>(list);
-  }
-
   std::string print(const FactorTable& factor) const
   {
     std::vector<std::array<double, 2>> rows;
