@@ -28,4 +28,22 @@ template <class List> void broadcast(List& list, MPI_Comm comm, int from = 0)
   by_messages(list, [&](char* bytes, int count) { MPI_Bcast(bytes, count, MPI_BYTE, from, comm); });
 }
 
+/// To a rank that receives a list of the same type.
+template <class List> void send(const List& list, int to, MPI_Comm comm)
+{
+  const unsigned long long size = list.size();
+  MPI_Send(&size, 1, MPI_UNSIGNED_LONG_LONG, to, 0, comm);
+  by_messages(list, [&](const char* bytes, int count) { MPI_Send(bytes, count, MPI_BYTE, to, 0, comm); });
+}
+
+/// Replaces the list by what the other rank sends.
+template <class List> void receive(List& list, int from, MPI_Comm comm)
+{
+  unsigned long long size = 0;
+  MPI_Recv(&size, 1, MPI_UNSIGNED_LONG_LONG, from, 0, comm, MPI_STATUS_IGNORE);
+  list.resize(size);
+  by_messages(list,
+              [&](char* bytes, int count) { MPI_Recv(bytes, count, MPI_BYTE, from, 0, comm, MPI_STATUS_IGNORE); });
+}
+
 } // namespace squeal
