@@ -332,8 +332,7 @@ bool steps_may_decide(const MotionSearch& search)
   constexpr double of_settling = 512; // periods
   const Scene& scene = search.scene;
   const SettledMotion& settled = search.found.settled;
-  const bool open = scene.fidelity == CycleModel::automatic && scene.cycle.steps_per_period == 0 &&
-                    scene.cycle.start.kind != CycleStartKind::coarse;
+  const bool open = scene.fidelity == CycleModel::automatic && scene.cycle.steps_per_period == 0;
   const double of_period = finer * search.found.cycle.steps_per_period * work_of_step(search.point.model->structure);
   if (!open || !has_run(settled.outcome) || of_settling * of_period > affordable_work) return false;
   const SettledBySteps now = by_steps(settled);
@@ -356,11 +355,11 @@ bool takes_finer_steps(MotionSearch& search)
 }
 
 /// Tries each way that applies.
-void try_in_order(MotionSearch& search, std::span<const Way> tried)
+void try_in_order(MotionSearch& search)
 {
   search.answered = false;
   search.settled_on.reset();
-  for (const Way& way : tried)
+  for (const Way& way : ways)
     if (way.applies(search)) way.run(search, way.name);
 }
 
@@ -384,8 +383,7 @@ void begin(MotionSearch& search, const StageRunner& run)
 
 } // namespace
 
-MotionStart motion_start(const SlidingPoint& point, const Scene& scene, const Trajectory& transient,
-                         const CoarseStart& coarse)
+MotionStart motion_start(const SlidingPoint& point, const Scene& scene, const Trajectory& transient)
 {
   const CycleStartKind kind = scene.cycle.start.kind;
   MotionStart start;
@@ -396,10 +394,6 @@ MotionStart motion_start(const SlidingPoint& point, const Scene& scene, const Tr
     start.given = GivenStart{copy_of(transient.end)};
   else if (kind == CycleStartKind::transient)
     start.missing = "the transient that it starts from the end of was not completed";
-  else if (kind == CycleStartKind::coarse && coarse.carried)
-    start.given = GivenStart{copy_of(coarse.carried->state), coarse.carried->period, coarse.carried->rounds};
-  else if (kind == CycleStartKind::coarse)
-    start.missing = "no cycle to start from was found on the coarse mesh: take a finer one, or start = \"estimate\"";
   return start;
 }
 
@@ -408,26 +402,10 @@ Motion find_motion(const SlidingPoint& point, const MotionStart& start, const Sc
 {
   MotionSearch search{point, start, scene, options, {}};
   begin(search, run);
-  do try_in_order(search, ways);
+  do try_in_order(search);
   while (takes_finer_steps(search));
   take_as_answer(search.found.settled, search.found.cycle.outcome);
   return std::move(search.found);
-}
-
-LimitCycle find_cycle(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options)
-{
-  const MotionStart start;
-  MotionSearch search{point, start, scene, options, {}};
-  begin(search, within_a_stage);
-  try_in_order(search, std::span(ways).first(2));
-  return std::move(search.found.cycle);
-}
-
-CycleSettings first_settings(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options)
-{
-  const MotionStart start;
-  const MotionSearch search{point, start, scene, options, {}};
-  return chosen_settings(cycle_problem(search, scene.cycle), search.request());
 }
 
 } // namespace squeal

@@ -11,8 +11,6 @@
 #include "squeal/reduction/reduced_model.hpp"
 
 #include <algorithm>
-#include <functional>
-#include <numeric>
 
 namespace squeal
 {
@@ -43,15 +41,8 @@ double steps_of_transient(const TransientSettings& transient)
 double points_of(const SweepSettings& sweep)
 {
   double points = static_cast<double>(std::max(sweep.values.size(), sweep.design.size()));
-  if (points == 0) points = std::accumulate(sweep.points.begin(), sweep.points.end(), 1., std::multiplies<>());
-  if (sweep.samples > 0) points = sweep.samples;
+  if (points == 0) points = sweep.points;
   return sweep.directions == SweepDirections::both ? 2 * points : points;
-}
-
-/// Motions that a sweep seeks at most: one a point.
-double motions_of(const Scene& scene)
-{
-  return scene.sweep && scene.sweep->stages == SweepStages::cycle ? points_of(*scene.sweep) : 0;
 }
 
 double steps_of_period(const Scene& scene)
@@ -62,13 +53,11 @@ double steps_of_period(const Scene& scene)
 double steps_of(const Scene& scene, const ProgramOptions& options)
 {
   double steps = steps_of_transient(scene.transient);
-  const double motions = motions_of(scene);
-  if (!scene.cycle.enabled && motions == 0) return steps;
+  if (!scene.cycle.enabled) return steps;
   const double a_period = steps_of_period(scene);
   const double cycle = a_period * std::min(usual_periods, static_cast<double>(options.cycle.shooting.max_periods));
   const double starts = scene.cycle.starts, points = scene.branch ? scene.branch->points : 0;
-  const double of_scene = scene.cycle.enabled ? cycle * (1 + starts + points) + a_period * scene.cycle.free_periods : 0;
-  return steps + of_scene + motions * (cycle + a_period * scene.cycle.free_periods);
+  return steps + cycle * (1 + starts + points) + a_period * scene.cycle.free_periods;
 }
 
 double sum_of_ranks(double value, MPI_Comm comm)
@@ -178,15 +167,16 @@ double memory_of_step(const Sizes& sizes, bool in_factor)
 }
 
 /// A reduced model has at most a shape for each pair, and those of the modes. Two may be held: that of the start, which
-/// takes no more than its part of what is `free`, and that of the multipliers, of fewer shapes. The latter is done
-/// without where it does not fit. The tangent needs a whole W.
+/// takes no more than its part of what is `free`, and that of the multipliers. Both have fewer shapes unless the
+/// reduced cycle is the answer. The latter is done without where it does not fit. The tangent needs a whole W.
 double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, bool in_factor, double free)
 {
   const double whole = in_factor || shares_operator(sizes) ? sizes.condensed_operator() : 0;
   const double least = memory_of_step(sizes, in_factor) + whole + number * vectors_of_shooting * sizes.dofs;
   const auto shapes = [&](double pairs) { return memory_of_reduction(sizes.dofs, pairs + vectors_of_modes_kept); };
-  const double start = fidelity == CycleModel::full ? 0 : std::min(shapes(sizes.pairs), memory_for_shapes(free));
-  const double multipliers = shapes(std::min<double>(sizes.pairs, attachments_on_recorded_contact));
+  const double multipliers = shapes(std::min<double>(sizes.pairs, attachments_on_recorded_contact)),
+               all = fidelity == CycleModel::reduced ? shapes(sizes.pairs) : multipliers;
+  const double start = fidelity == CycleModel::full ? 0 : std::min(all, memory_for_shapes(free));
   return least + start + multipliers <= free ? least + start + multipliers : least + start;
 }
 
@@ -232,10 +222,8 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)
     add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient));
-  const bool as_full = scene.fidelity == CycleModel::automatic && scene.cycle.start.kind == CycleStartKind::coarse;
-  const double cycle = memory_of_cycle(sizes, as_full ? CycleModel::full : scene.fidelity, in_factor, free);
-  if (scene.cycle.enabled) add(Stage::cycle, cycle);
-  if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)) + (motions_of(scene) > 0 ? cycle : 0));
+  if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity, in_factor, free));
+  if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)));
   if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));
   forecast.steps = steps_of(scene, options);
   return forecast;

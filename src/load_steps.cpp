@@ -48,7 +48,7 @@ std::vector<PathStep> path_to(Vec load, const Scene& scene, const LoadOf& load_o
   return path;
 }
 
-std::vector<PathStep> path_of_mesh(const Structure& structure, const Scene& scene, const MeshPiece& piece,
+std::vector<PathStep> path_of_mesh(const Structure& structure, const Scene& scene, const NumberedMesh& numbered,
                                    MPI_Comm comm)
 {
   Scene stepped = scene;
@@ -64,7 +64,7 @@ std::vector<PathStep> path_of_mesh(const Structure& structure, const Scene& scen
   return path_to(structure.load, stepped,
                  [&](const Scene& loaded, const LoadStep&)
                  {
-                   Owned<Vec> load = assemble_load(piece.mesh, loaded, piece.dofs, comm);
+                   Owned<Vec> load = assemble_load(numbered.mesh, loaded, numbered.dofs, comm);
                    if (structure.preload.get()) check(VecAXPY(load, 1, structure.preload));
                    return load;
                  });

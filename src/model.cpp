@@ -1,6 +1,5 @@
 #include "squeal/model.hpp"
 
-#include "squeal/base/broadcast.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/base/run_control.hpp"
@@ -109,8 +108,8 @@ BrakeModel sharing(const Structure& own, const Interface& contact)
   return result;
 }
 
-/// On rank 0 the mesh, elsewhere nothing. A signal to the run reaches its mesher as well, which ends by it: the mesh is
-/// no error then.
+/// The mesh, on every rank. A signal to the run reaches its mesher as well, which ends by it: the mesh is no error
+/// then.
 Mesh read_mesh_unless_ended(const Scene& scene, MPI_Comm comm)
 {
   Mesh mesh;
@@ -123,57 +122,43 @@ Mesh read_mesh_unless_ended(const Scene& scene, MPI_Comm comm)
     end_if_asked(comm);
     throw;
   }
+  broadcast_mesh(mesh, comm);
   return mesh;
 }
 
-/// Numbers the mesh of rank 0 and finds its pairs.
-MeshPiece numbered(const Scene& scene, Mesh mesh, ContactPairs& contact, MPI_Comm comm)
+/// Finds the pairs of a mesh and numbers its degrees of freedom, alike on every rank.
+NumberedMesh number_mesh(const Scene& scene, Mesh mesh, ContactPairs& contact, MPI_Comm comm)
 {
-  MeshPiece piece;
-  piece.mesh = std::move(mesh);
+  NumberedMesh numbered{std::move(mesh)};
   end_if_asked(comm);
-  on_rank_zero(comm, [&] { contact = make_pairs(piece.mesh, scene); });
-  broadcast_pairs(contact, comm);
+  on_every_rank(comm, [&] { contact = make_pairs(numbered.mesh, scene); });
   end_if_asked(comm);
   const auto part_and_number = [&]
   {
-    piece.partition = partition_mesh(piece.mesh, contact.pairs, ranks_of(comm));
-    piece.dofs = number_dofs(piece.mesh, scene, piece.partition, comm);
+    numbered.partition = partition_mesh(numbered.mesh, contact.pairs, ranks_of(comm));
+    numbered.dofs = number_dofs(numbered.mesh, scene, numbered.partition, comm);
   };
-  on_rank_zero(comm, part_and_number);
-  distribute(piece, comm);
+  on_every_rank(comm, part_and_number);
   end_if_asked(comm);
-  return piece;
-}
-
-/// Leaves the mesh and the degrees of freedom of a piece on rank 0.
-void take_mesh(Model& model, MeshPiece piece, MPI_Comm comm)
-{
-  if (rank_of(comm) == 0)
-  {
-    model.mesh = std::move(piece.mesh);
-    model.dofs = std::move(piece.dofs);
-  }
-  else
-    model.dofs.size = piece.dofs.size;
+  return numbered;
 }
 
 Model model_of_mesh(Scene& scene, Mesh mesh, MPI_Comm comm)
 {
   Model model;
   std::vector<int> rotors;
-  on_rank_zero(comm, [&] { rotors = rotors_of_contacts(scene, mesh); });
-  broadcast(rotors, comm);
+  on_every_rank(comm, [&] { rotors = rotors_of_contacts(scene, mesh); });
   if (!scene.rotors.empty()) drive_contacts(scene, rotors);
   ContactPairs contact;
-  MeshPiece piece = numbered(scene, std::move(mesh), contact, comm);
-  model.structure = assemble(piece, scene, comm);
-  model.structure.path = path_of_mesh(model.structure, scene, piece, comm);
-  model.interface = make_interface(contact.pairs, scene, piece.dofs, comm);
+  NumberedMesh numbered = number_mesh(scene, std::move(mesh), contact, comm);
+  model.structure = assemble(numbered, scene, comm);
+  model.structure.path = path_of_mesh(model.structure, scene, numbered, comm);
+  model.interface = make_interface(contact.pairs, scene, numbered.dofs, comm);
   tighten(model.structure, model.interface);
   model.coverage = contact.coverage;
-  model.probes = probe_rows(scene.probes, piece.mesh, piece.dofs, comm);
-  take_mesh(model, std::move(piece), comm);
+  model.probes = probe_rows(scene.probes, numbered.mesh, numbered.dofs, comm);
+  model.mesh = std::move(numbered.mesh);
+  model.dofs = std::move(numbered.dofs);
   return model;
 }
 
@@ -190,7 +175,6 @@ Model build_model(Scene& scene, MPI_Comm comm)
 {
   Model model =
       scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, read_mesh_unless_ended(scene, comm), comm);
-  if (scene.sweep || scene.robustness) broadcast_mesh(model.mesh, comm); // they make models on groups of ranks
   double mass = 0;
   check(MatNorm(model.structure.M, NORM_1, &mass));
   if (mass == 0 && (scene.modes.enabled || scene.transient.enabled || scene.cycle.enabled))
@@ -228,12 +212,12 @@ std::set<Effect> NearbyModels::changes(const Known& known, const Values& values)
   return changed;
 }
 
-const MeshPiece& NearbyModels::piece(const Scene& scene)
+const NumberedMesh& NearbyModels::numbered(const Scene& scene)
 {
-  if (piece_) return *piece_;
-  piece_ = numbered(scene, rank_of(comm_) == 0 ? with_points(model_.mesh, scene) : Mesh{}, pairs_, comm_);
+  if (numbered_) return *numbered_;
+  numbered_ = number_mesh(scene, with_points(model_.mesh, scene), pairs_, comm_);
   ++made_.mesh;
-  return *piece_;
+  return *numbered_;
 }
 
 BrakeModel NearbyModels::made_from_files(const Scene& scene)
@@ -273,7 +257,7 @@ BrakeModel NearbyModels::made_of_mesh(const Scene& scene, const std::set<Effect>
     for (const auto& [of, matrix] : {std::pair{mass_of, &Structure::M}, {stiffness_of, &Structure::K}})
       if (!of) last_.model.structure.*matrix = {}; // not beside the new one
     last_.model.structure.C = {};
-    next.structure = assemble(piece(scene), scene, comm_);
+    next.structure = assemble(numbered(scene), scene, comm_);
     ++made_.matrices;
   }
   Structure& structure = next.structure;
@@ -285,16 +269,16 @@ BrakeModel NearbyModels::made_of_mesh(const Scene& scene, const std::set<Effect>
     share_loads(load_of->structure, structure);
   else
   {
-    structure.load = assemble_load(piece(scene).mesh, scene, piece(scene).dofs, comm_);
-    assemble_preload(structure, piece(scene), scene, comm_);
-    structure.path = path_of_mesh(structure, scene, piece(scene), comm_);
+    structure.load = assemble_load(numbered(scene).mesh, scene, numbered(scene).dofs, comm_);
+    assemble_preload(structure, numbered(scene), scene, comm_);
+    structure.path = path_of_mesh(structure, scene, numbered(scene), comm_);
     ++made_.load;
   }
   if (contact_of)
     next.interface = sharing({}, contact_of->interface).interface;
   else
   {
-    const MeshPiece& mesh = piece(scene);
+    const NumberedMesh& mesh = numbered(scene);
     next.interface = make_interface(pairs_.pairs, scene, mesh.dofs, comm_);
     ++made_.contact;
     if (rows_of) next.interface.B = shared(rows_of->interface.B.get());
@@ -309,7 +293,7 @@ BrakeModel NearbyModels::at(std::span<const SceneNumber> numbers)
   for (const auto& [key, value] : driven_by(scene_, numbers)) values[key] = value;
   const std::set<Effect> from_own = changes(own_, values), from_last = changes(last_, values);
   last_.values.reset(); // until the next model is made
-  if (from_last.contains(Effect::mesh)) piece_.reset();
+  if (from_last.contains(Effect::mesh)) numbered_.reset();
   const auto is_friction = [](Effect effect) { return effect == Effect::friction; };
   if (!scene.matrices)
     last_.model = made_of_mesh(scene, from_own, from_last);
@@ -325,32 +309,13 @@ BrakeModel NearbyModels::at(std::span<const SceneNumber> numbers)
   return sharing(last_.model.structure, interface);
 }
 
-Model NearbyModels::whole_at(std::span<const SceneNumber> numbers)
+void add_shifts(const Scene& scene, const Model& model, std::vector<double>& values)
 {
-  const Scene scene = scene_with(scene_, numbers);
-  if (scene.matrices) return model_of_matrices(scene, comm_);
-  Model model;
-  BrakeModel brake = at(numbers);
-  model.structure = std::move(brake.structure);
-  model.interface = std::move(brake.interface);
-  model.probes = probe_rows(scene.probes, piece(scene).mesh, piece(scene).dofs, comm_);
-  model.coverage = pairs_.coverage;
-  take_mesh(model, piece(scene), comm_);
-  return model;
-}
-
-void add_shifts(const Scene& scene, const Model& model, std::vector<double>& values, MPI_Comm comm)
-{
-  const auto add_all = [&]
-  {
-    if (model.dofs.shift.empty()) return;
-    const std::vector<int> nodes = probed_nodes(scene.probes, model.mesh);
-    for (std::size_t i = 0; i < nodes.size(); ++i)
-      for (std::size_t c = 0; c < 3; ++c)
-        values[i] += scene.probes[i].direction[c] * model.dofs.shift_of(6 * PetscInt{nodes[i]} + static_cast<int>(c));
-  };
-  on_rank_zero(comm, add_all);
-  broadcast(values, comm);
+  if (model.dofs.shift.empty()) return;
+  const std::vector<int> nodes = probed_nodes(scene.probes, model.mesh);
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    for (std::size_t c = 0; c < 3; ++c)
+      values[i] += scene.probes[i].direction[c] * model.dofs.shift_of(6 * PetscInt{nodes[i]} + static_cast<int>(c));
 }
 
 std::vector<double> probe_values(Mat probes, Vec u)

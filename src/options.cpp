@@ -27,7 +27,7 @@ std::string nearest_option(const std::string& option)
     if (as_option == option) return "it is a key of the scene: --set " + key + "=…";
   }
   const std::string nearest = nearest_word(option, known);
-  return nearest.empty() ? "squeal -help lists the options" : "did you mean " + nearest + "?";
+  return nearest.empty() ? "squeal --reference keys lists the options" : "did you mean " + nearest + "?";
 }
 
 } // namespace
@@ -71,8 +71,8 @@ OptionList options_of(ProgramOptions& options)
        "needs, within limits. A number bounds the columns of the whole matrix or of a search"},
       {"-cycle_watched_periods", &shooting.watched_periods, Range::any,
        "periods integrated from beside the cycle found, 3 % of its fluctuation along the fastest motion, to see it "
-       "grow or decay; again from a tenth and a hundredth of that where growth and multiplier differ; below 0: 200 "
-       "where a whole tangent does not decide, else none"},
+       "grow or decay; again from a tenth and a hundredth of that where growth and multiplier differ; below 0: where "
+       "that decides what a bar leaves open, at most 200, as the search took or as is affordable"},
       {"-settled_periods", &options.settled.periods, Range::not_negative,
        "largest number of periods integrated to see what a motion settles on where no cycle attracts; 0: 2048, or 512 "
        "where periods are dear"},
@@ -100,15 +100,6 @@ std::string problem_of_option_name(const std::string& name)
   const OptionList own = options_of(unused);
   const bool known = std::ranges::find(own, option, &Option::name) != own.end() || solver_prefix_of(name);
   return known ? "" : "unknown option " + shortened(option) + "; " + nearest_option(option.substr(0, 60));
-}
-
-std::string option_reference()
-{
-  ProgramOptions standard;
-  std::string text;
-  for (const Option& option : options_of(standard))
-    text += format("  %-36s%s [%s]\n", option.name.c_str(), option.meaning.c_str(), value_of(option).c_str());
-  return text;
 }
 
 std::string option_page()

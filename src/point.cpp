@@ -151,11 +151,6 @@ SlidingPoint with_small_motions(SlidingPoint point, const Scene& scene, const Pr
   return point;
 }
 
-SlidingPoint find_point(const Model& model, const Scene& scene, const ProgramOptions& options, const StageRunner& run)
-{
-  return with_small_motions(find_sliding(model, options, run), scene, options, run);
-}
-
 std::span<const ComplexMode> followed_modes(const SlidingPoint& point, const Scene& scene)
 {
   const CycleStartKind start = scene.cycle.start.kind;

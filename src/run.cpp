@@ -2,15 +2,12 @@
 
 #include "squeal/base/free_memory.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/coarse.hpp"
 #include "squeal/forecast.hpp"
-#include "squeal/reduction/model_files.hpp"
 #include "squeal/scene/numbers.hpp"
 #include "squeal/studies.hpp"
 
 #include <algorithm>
 #include <cstdio>
-#include <optional>
 #include <utility>
 
 namespace squeal
@@ -83,23 +80,18 @@ void print_end(const Report& report, const ResultsFolder& results, MPI_Comm comm
   if (report.ended_by.empty())
     std::printf("results are in %s\n", results.place().c_str());
   else
-    std::printf("ended %s: results so far are in %s; the same command with --restart goes on from the last checkpoint\n",
-                report.ended_by.c_str(), results.place().c_str());
+    std::printf(
+        "ended %s: results so far are in %s; the same command with --restart goes on from the last checkpoint\n",
+        report.ended_by.c_str(), results.place().c_str());
 }
 
-/// Prints the size of the coarse mesh of the scene's start, and returns it. Reads the files that stages start from, for
-/// their errors alone. Collective.
-std::optional<CoarseModel> check_starts(const Scene& scene, const Model& model, MPI_Comm comm)
+/// Reads the files that stages start from, for their errors alone. Collective.
+void check_starts(const Scene& scene, const Model& model)
 {
-  std::optional<CoarseModel> coarse = coarse_model_of(scene, model);
-  if (coarse && rank_of(comm) == 0)
-    std::printf("  coarse mesh: %lld degrees of freedom, %d contact pairs\n",
-                static_cast<long long>(coarse->model.dofs.size), coarse->model.interface.pairs);
   if (scene.transient.enabled && scene.transient.start.kind == StartKind::file)
     (void)read_state(scene.transient.start.file, model.structure);
   if (scene.cycle.enabled && scene.cycle.start.kind == CycleStartKind::file)
     (void)read_state(scene.cycle.start.file, model.structure);
-  return coarse;
 }
 
 /// Throws Error where the scene asks for a stage that does not know pairs without a drive yet.
@@ -118,8 +110,7 @@ void refuse_undriven_pairs(const Scene& scene, const Interface& interface)
       throw Error(scene.file.string() + ": " + stage + " does not know pairs without a drive yet, and " + contact +
                   " has some: " + remedy + ", or give the contact a velocity, or friction = 0");
   };
-  refuse(scene.modes.reduced_matrices, "[modes] reduced_matrices", "set it to false");
-  refuse(scene.sweep && scene.sweep->stages != SweepStages::equilibrium, "[sweep] of modes or cycles",
+  refuse(scene.sweep && scene.sweep->stages != SweepStages::equilibrium, "[sweep] of modes",
          "set sweep.stages = \"equilibrium\"");
   refuse(scene.sensitivity.has_value(), "[sensitivity]", "take it out");
   refuse(scene.robustness.has_value(), "[robustness]", "take it out");
@@ -151,7 +142,7 @@ ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results,
   report.model = summary_with_doubts(model, scene, comm);
   print_model(report.model, comm);
   refuse_undriven_pairs(scene, model.interface);
-  const std::optional<CoarseModel> coarse = check_starts(scene, model, comm);
+  check_starts(scene, model);
   end_if_asked(comm);
   const Forecast forecast = forecast_of(model, scene, options);
   if (rank_of(comm) == 0) std::printf("%s", factor_text(forecast).c_str());
@@ -169,20 +160,16 @@ ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results,
     report.contacts = contact_resultants(model.interface, point.equilibrium.reactions, scene.contacts);
     check(VecNorm(point.equilibrium.u, NORM_INFINITY, &report.displacement));
     report.equilibrium_probes = probe_values(model.probes, point.equilibrium.u);
-    add_shifts(scene, model, report.equilibrium_probes, comm);
+    add_shifts(scene, model, report.equilibrium_probes);
     for (const TightBolt& bolt : model.structure.bolts)
       report.bolts.push_back({bolt.name, tension_of(bolt, point.equilibrium.u), bolt.shortening});
   }
   save();
   report.point = with_small_motions(std::move(report.point), scene, options, runner);
   save();
-  if (scene.modes.reduced_matrices && !point.modes.modes.empty())
-    write_reduced_matrices(point.sliding(), point.modes.modes, options.step.factor,
-                           results.partial() / word(ResultFile::reduced));
   stage(Stage::response, report.response, [&] { return run_response(point, scene, options); });
   stage(Stage::transient, report.transient, [&] { return find_transient(point, scene, options); });
-  if (coarse) stage(Stage::coarse, report.coarse, [&] { return find_coarse_start(*coarse, point, scene, options); });
-  const MotionStart start = motion_start(point, scene, report.transient, report.coarse);
+  const MotionStart start = motion_start(point, scene, report.transient);
   const Motion& motion = report.motion = find_motion(point, start, scene, options, runner);
   save();
   stage(Stage::attractors, report.attractors, [&] { return run_attractors(point, motion, scene, options); });
@@ -209,7 +196,7 @@ void dry_run(Scene scene, const ProgramOptions& options, MPI_Comm comm)
   if (rank_of(comm) == 0) std::printf("# the model\n");
   print_model(summary_with_doubts(model, scene, comm), comm);
   refuse_undriven_pairs(scene, model.interface);
-  (void)check_starts(scene, model, comm);
+  check_starts(scene, model);
   const Forecast forecast = forecast_of(model, scene, options);
   if (rank_of(comm) == 0) std::printf("%s", text_of(forecast).c_str());
   const std::string problem = problem_of(forecast, comm);

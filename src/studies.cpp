@@ -1,7 +1,5 @@
 #include "squeal/studies.hpp"
 
-#include "squeal/swept_motion.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -72,7 +70,7 @@ SlidingStability stability_beside_branch(NearbyModels& models, const Scene& scen
   { return models.at(numbers_of(settings.key, value)); };
   const SweepOptions together{.groups = 1};
   const Sweep sweep =
-      run_sweep({settings, model_at, {}, scene.modes, options.modes, options.equilibrium, together}, models.comm());
+      run_sweep({settings, model_at, scene.modes, options.modes, options.equilibrium, together}, models.comm());
   if (sweep.outcome.kind == OutcomeKind::interrupted) throw Interrupted{};
   SlidingStability stability;
   for (const SweepPoint& point : sweep.points)
@@ -140,24 +138,27 @@ Sweep run_scene_sweep(const Model& model, const Scene& scene, const ProgramOptio
                                                 "in the symmetric part of K as well: sweep one direction, and the "
                                                 "other one with matrices of its own");
   std::optional<NearbyModels> models; // of the group of ranks that this one is in
-  const auto models_on = [&](MPI_Comm comm) -> NearbyModels&
-  { return models && models->comm() == comm ? *models : models.emplace(model, scene, comm); };
   const auto model_at = [&](std::span<const double> values, MPI_Comm comm)
-  { return models_on(comm).at(numbers_of(scene.sweep->key, values)); };
-  const auto motion_at = [&](const SweptPlace& place, MPI_Comm comm)
-  { return find_swept_motion(models_on(comm), scene, options, place); };
-  return run_sweep({*scene.sweep, model_at, motion_at, scene.modes, options.modes, options.equilibrium, options.sweep},
+  {
+    if (!models || models->comm() != comm) models.emplace(model, scene, comm);
+    return models->at(numbers_of(scene.sweep->key, values));
+  };
+  return run_sweep({*scene.sweep, model_at, scene.modes, options.modes, options.equilibrium, options.sweep},
                    comm_of(model.structure.load));
 }
 
 Robustness run_robustness(const Model& model, const Scene& scene, const ProgramOptions& options)
 {
-  NearbyModels models(model, scene, PETSC_COMM_SELF);
   std::vector<std::string> keys;
   for (const UncertainNumber& number : scene.uncertain) keys.push_back(number.key);
-  const auto model_at = [&](std::span<const double> values, MPI_Comm) { return models.at(numbers_of(keys, values)); };
+  std::optional<NearbyModels> models; // as of a sweep
+  const auto model_at = [&](std::span<const double> values, MPI_Comm comm)
+  {
+    if (!models || models->comm() != comm) models.emplace(model, scene, comm);
+    return models->at(numbers_of(keys, values));
+  };
   return find_robustness(
-      {*scene.robustness, scene.uncertain, model_at, scene.modes, options.modes, options.equilibrium, scene.accuracy},
+      {*scene.robustness, scene.uncertain, model_at, scene.modes, options.modes, options.equilibrium, options.sweep},
       comm_of(model.structure.load));
 }
 

@@ -14,20 +14,12 @@ struct MotionStart
   std::string missing; // why it is not there; empty if it is
 };
 
-/// The start that the scene names: a file, the end of the transient, or the cycle of the coarse mesh. Error: as of
-/// read_state.
-MotionStart motion_start(const SlidingPoint& point, const Scene& scene, const Trajectory& transient,
-                         const CoarseStart& coarse);
+/// The start that the scene names: a file, or the end of the transient. Error: as of read_state.
+MotionStart motion_start(const SlidingPoint& point, const Scene& scene, const Trajectory& transient);
 
 /// Finds the cycle, and where none attracts the motion that is settled on. "auto" goes through the ways again at four
 /// times the steps a period, while these may decide and are affordable.
 Motion find_motion(const SlidingPoint& point, const MotionStart& start, const Scene& scene,
                    const ProgramOptions& options, const StageRunner& run);
-
-/// Finds the cycle alone, from the modes, within a stage.
-LimitCycle find_cycle(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options);
-
-/// The settings with which the search begins.
-CycleSettings first_settings(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options);
 
 } // namespace squeal

@@ -15,7 +15,7 @@ std::vector<PathStep> path_to(Vec load, const Scene& scene, const LoadOf& load_o
 
 /// The path of a mesh scene whose structure has its load and preload. Bolts that no step tightens are tightened before
 /// the first one.
-std::vector<PathStep> path_of_mesh(const Structure& structure, const Scene& scene, const MeshPiece& piece,
+std::vector<PathStep> path_of_mesh(const Structure& structure, const Scene& scene, const NumberedMesh& numbered,
                                    MPI_Comm comm);
 
 /// Shares load, preload, bolts and path.

@@ -11,7 +11,7 @@ namespace squeal
 {
 
 /// Gives the scene's contacts the drives of its rotors, which the mesh tells. Collective. Error: as of the mesh, the
-/// structure and the interface; no mass. Rank 0 reads and numbers the mesh.
+/// structure and the interface; no mass. Rank 0 reads the mesh.
 Model build_model(Scene& scene, MPI_Comm comm);
 
 /// How often the parts of models were made.
@@ -35,9 +35,6 @@ public:
   /// they make no scene.
   BrakeModel at(std::span<const SceneNumber> numbers);
 
-  /// The model with mesh and probes, as build_model returns it. Collective.
-  Model whole_at(std::span<const SceneNumber> numbers);
-
   MPI_Comm comm() const { return comm_; }
   const PartsMade& made() const { return made_; }
 
@@ -54,13 +51,13 @@ private:
   std::set<Effect> changes(const Known& known, const Values& values) const;
   BrakeModel made_from_files(const Scene& scene);
   BrakeModel made_of_mesh(const Scene& scene, const std::set<Effect>& from_own, const std::set<Effect>& from_last);
-  const MeshPiece& piece(const Scene& scene);
+  const NumberedMesh& numbered(const Scene& scene);
 
   const Model& model_;
   const Scene& scene_;
   MPI_Comm comm_;
   Known own_{}, last_{};
-  std::optional<MeshPiece> piece_{};
+  std::optional<NumberedMesh> numbered_{};
   ContactPairs pairs_{};
   PartsMade made_{};
 };
@@ -69,8 +66,8 @@ private:
 /// Collective.
 ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm);
 
-/// Adds to what probes read of an equilibrium by how much supports move their nodes [m]. Collective.
-void add_shifts(const Scene& scene, const Model& model, std::vector<double>& values, MPI_Comm comm);
+/// Adds to what probes read of an equilibrium by how much supports move their nodes [m].
+void add_shifts(const Scene& scene, const Model& model, std::vector<double>& values);
 
 /// The probes' values of a displacement [m], whole on every rank. Collective.
 std::vector<double> probe_values(Mat probes, Vec u);

@@ -17,9 +17,6 @@ SlidingPoint find_sliding(const Model& model, const ProgramOptions& options, con
 SlidingPoint with_small_motions(SlidingPoint point, const Scene& scene, const ProgramOptions& options,
                                 const StageRunner& run);
 
-/// Both of these.
-SlidingPoint find_point(const Model& model, const Scene& scene, const ProgramOptions& options, const StageRunner& run);
-
 /// The unstable modes. Where none is, and the cycle is sought from a state that the scene gives, the one that decays
 /// slowest: a cycle may attract beside a stable equilibrium.
 std::span<const ComplexMode> followed_modes(const SlidingPoint& point, const Scene& scene);

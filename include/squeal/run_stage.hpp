@@ -13,13 +13,6 @@ namespace squeal
 /// result; empty if it has one.
 using StageRunner = std::function<std::string(Stage which, const std::function<bool()>& work)>;
 
-/// Runs a stage within another one. Throws Interrupted where the end of the run cuts it short.
-inline std::string within_a_stage(Stage, const std::function<bool()>& work)
-{
-  if (work()) throw Interrupted{};
-  return {};
-}
-
 /// The result of a stage that did not run, with the reason.
 template <class Result> Result not_run(OutcomeKind kind, const std::string& reason)
 {

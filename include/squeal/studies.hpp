@@ -20,7 +20,7 @@ BrakeBranch run_branch(const SlidingPoint& point, const Motion& motion, const Sc
 /// Derivatives of the unstable modes, and the effect of changes of the scene on them.
 Sensitivity run_sensitivity(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options);
 
-/// Modes over numbers of the scene and, where it asks for them, what is heard there.
+/// Modes over numbers of the scene.
 Sweep run_scene_sweep(const Model& model, const Scene& scene, const ProgramOptions& options);
 
 /// How uncertain numbers of the scene change the modes.

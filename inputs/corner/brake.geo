@@ -78,8 +78,9 @@ For quarter In {0:3}
 EndFor
 
 // ---------------------------------------------------------------------------------------------------------------- pads
-// A sector, and at each end an ear with a tab that stands in the bracket.
-tab_in = 0.062; tab_end = 0.072; ledge = 0.088; tab_top = 0.108;
+// A sector, and at each end an ear with a tab that stands in the bracket. Its foot ends at a relief before the tab's face:
+// a node of both would have two pairs along the same motions.
+tab_in = 0.062; relief = 0.069; tab_end = 0.072; ledge = 0.088; tab_top = 0.108;
 angle = pad_angle * Pi / 360;
 shim_inner_radius = pad_inner + 0.002; shim_outer_radius = pad_outer - 0.002; shim_angle = angle * 0.57;
 For side In {-1:1:2}
@@ -102,22 +103,28 @@ For side In {-1:1:2}
       c1 = b1; c2 = b2; edge = -l4;
     EndIf
     d1 = newp; Point(d1) = {end * tab_in, ledge, z}; d2 = newp; Point(d2) = {end * tab_in, tab_top, z};
+    f1 = newp; Point(f1) = {end * relief, ledge, z}; f2 = newp; Point(f2) = {end * relief, tab_top, z};
     e1 = newp; Point(e1) = {end * tab_end, ledge, z}; e2 = newp; Point(e2) = {end * tab_end, tab_top, z};
     m1 = newc; Line(m1) = {c1, d1}; m2 = newc; Line(m2) = {d1, d2}; m3 = newc; Line(m3) = {d2, c2};
-    m4 = newc; Line(m4) = {d1, e1}; m5 = newc; Line(m5) = {e1, e2}; m6 = newc; Line(m6) = {e2, d2};
-    Transfinite Curve{m2, m5} = n_two + 1; Transfinite Curve{m1, m3, m4, m6} = n_one + 1;
+    m4 = newc; Line(m4) = {d1, f1}; m5 = newc; Line(m5) = {f1, f2}; m6 = newc; Line(m6) = {f2, d2};
+    m7 = newc; Line(m7) = {f1, e1}; m8 = newc; Line(m8) = {e1, e2}; m9 = newc; Line(m9) = {e2, f2};
+    Transfinite Curve{m2, m5, m8} = n_two + 1; Transfinite Curve{m1, m3, m4, m6, m7, m9} = n_one + 1;
     s = news; Curve Loop(s) = {m1, m2, m3, -edge}; Plane Surface(s) = {s}; ears[] += s; Transfinite Surface{s};
     s = news; Curve Loop(s) = {m4, m5, m6, -m2}; Plane Surface(s) = {s}; ears[] += s; Transfinite Surface{s};
+    s = news; Curve Loop(s) = {m7, m8, m9, -m5}; Plane Surface(s) = {s}; ears[] += s; Transfinite Surface{s};
   EndFor
   out[] = Extrude{0, 0, -side * lining}{ Surface{sector}; Layers{n_one}; Recombine; };
   linings[] += out[1]; lining_face[] += out[0];
   out[] = Extrude{0, 0, side * plate}{ Surface{sector}; Layers{n_thin}; Recombine; };
   plates[] += out[1]; back[] += out[0]; clip[] += out[4];
-  For i In {0:3}
+  For i In {0:5}
     out[] = Extrude{0, 0, side * plate}{ Surface{ears[i]}; Layers{n_thin}; Recombine; };
     plates[] += out[1];
-    If (i % 2 == 1)
-      tab_ledge[] += out[2]; tab_face[] += out[3];
+    If (i % 3 == 1)
+      tab_ledge[] += out[2];
+    EndIf
+    If (i % 3 == 2)
+      tab_relief[] += out[2]; tab_face[] += out[3];
     EndIf
   EndFor
 
@@ -204,7 +211,7 @@ For j In {0:4}
         bracket[] += out[1];
         under_low = i == 0 ? x[1] : x[3]; under_high = i == 0 ? x[2] : x[4];
         outer_ledge[] += Surface In BoundingBox{under_low - e, y[2] - e, z_arm - e, under_high + e, y[2] + e, z_out + e};
-        outer_ledge[] -= tab_ledge[];
+        outer_ledge[] -= {tab_ledge[], tab_relief[]};
       EndIf
     EndIf
   EndFor

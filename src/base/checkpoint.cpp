@@ -115,11 +115,6 @@ void open_checkpoints(const CheckpointPlace& given)
                 file.string() + "): give those, or begin again without --restart");
 }
 
-Finally without_checkpoints()
-{
-  return Finally([before = std::exchange(place(), {})] { place() = before; });
-}
-
 void keep(const std::string& name, MPI_Comm comm, const Description& describe)
 {
   checkpoint_made();

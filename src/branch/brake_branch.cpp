@@ -61,85 +61,6 @@ Outcome outcome_of(const BrakeBranchProblem& problem, const BrakeBranch& found)
   return outcome;
 }
 
-void widen(ParameterRange& range, double parameter)
-{
-  range.from = std::min(range.from, parameter);
-  range.to = std::max(range.to, parameter);
-}
-
-/// A place on the branch, with a stable cycle or without.
-struct Place
-{
-  double parameter = 0;
-  bool stable = false;
-};
-
-/// The branch's decided points, and between a stable and an unstable one the fold that parts them: up to there cycles
-/// are stable. Undecided points end no range, as an event would.
-std::vector<Place> places_along(const Branch& branch)
-{
-  std::vector<Place> places;
-  double least = HUGE_VAL, greatest = -HUGE_VAL; // from the last decided point on
-  for (const BranchPoint& point : branch.points)
-  {
-    least = std::min(least, point.parameter);
-    greatest = std::max(greatest, point.parameter);
-    if (point.multipliers.stability == Stability::undecided) continue;
-    const bool stable = point.multipliers.stability == Stability::stable;
-    if (!places.empty() && places.back().stable != stable)
-    {
-      const double length = greatest - least;
-      const auto fold = std::ranges::find_if(branch.events,
-                                             [&](const BranchEvent& event)
-                                             {
-                                               return event.kind == BranchEventKind::fold &&
-                                                      event.parameter >= least - length - event.error &&
-                                                      event.parameter <= greatest + length + event.error;
-                                             });
-      if (fold != branch.events.end()) places.push_back({fold->parameter, true});
-    }
-    places.push_back({point.parameter, stable});
-    least = greatest = point.parameter;
-  }
-  return places;
-}
-
-/// The number of unstable modes at a value, from those at the values around it and the Hopf points between them; -1:
-/// not known.
-int unstable_modes_at(double parameter, const SlidingStability& stability)
-{
-  const EquilibriumStability* below = nullptr;
-  for (const EquilibriumStability& equilibrium : stability.equilibria)
-    if (equilibrium.known && equilibrium.parameter <= parameter) below = &equilibrium;
-  if (!below) return -1;
-  int count = below->unstable_modes;
-  for (const BranchEvent& hopf : stability.hopf)
-    if (hopf.parameter > below->parameter && hopf.parameter <= parameter) count += hopf.change;
-  return count;
-}
-
-/// Where a stable cycle stands beside a stable equilibrium: ranges of successive places, up to the Hopf point between
-/// stable cycles.
-std::vector<ParameterRange> coexistence_of(const Branch& branch, const SlidingStability& stability)
-{
-  std::vector<ParameterRange> ranges;
-  std::optional<double> before; // a stable cycle
-  bool open = false;
-  for (const Place& place : places_along(branch))
-  {
-    const bool both = place.stable && unstable_modes_at(place.parameter, stability) == 0;
-    if (both && !open) ranges.push_back({place.parameter, place.parameter});
-    if (both) widen(ranges.back(), place.parameter);
-    if (both != open && place.stable && before)
-      for (const BranchEvent& event : stability.hopf)
-        if ((event.parameter - *before) * (event.parameter - place.parameter) < 0)
-          widen(ranges.back(), event.parameter);
-    before = place.stable ? std::optional(place.parameter) : std::nullopt;
-    open = both;
-  }
-  return ranges;
-}
-
 /// Whether so many shapes are worth a model of their own. A step of a dense model reads a few of its square matrices,
 /// and one of the full model its factor, which has a few dozen entries a column: at an eighth of the size both take as
 /// long, and the derivatives of the dense one still cost far less.
@@ -204,31 +125,6 @@ void check_on_full_model(BrakeFamily& full, const ReducedFamily& reduced, Branch
   }
 }
 
-/// Points spread evenly over the branch, closed on the full model.
-std::vector<CorrectedPoint> corrected_points(BrakeFamily& full, ReducedFamily& reduced,
-                                             const BrakeBranchProblem& problem,
-                                             const ContinuationSettings& continuation, const Branch& branch)
-{
-  const std::vector<ReducedPoint> points = points_of_first_rank(branch, comm_of(problem.sliding.structure.load));
-  std::vector<CorrectedPoint> corrected;
-  const auto wanted = std::min(points.size(), static_cast<std::size_t>(problem.settings.corrections));
-  for (std::size_t i = 0; i < wanted; ++i)
-  {
-    const std::size_t place = wanted < 2 ? points.size() / 2 : i * (points.size() - 1) / (wanted - 1);
-    const ReducedPoint& point = points[place];
-    full.set_parameter(point.parameter);
-    full.start_from_rest();
-    reduced.set_parameter(point.parameter);
-    FlowFamily family = full.flows();
-    family.parameter_column = [](double, Vec, Vec column) { check(VecSet(column, 0)); }; // the parameter stays
-    family.preconditioner = reduced.lifted_preconditioner(point.period, point.state);
-    const Owned<Vec> start = reduced.lifted(point.state);
-    const Orbit orbit{copy_of(start.get()), point.period, zeros_like(start), zeros_like(start), 0, 0};
-    corrected.push_back({place, close_orbit(family, continuation, problem.shooting, orbit, point.parameter)});
-  }
-  return corrected;
-}
-
 /// The branch of a reduced model, which every rank follows by itself. Collective.
 Branch trace_by_itself(ReducedFamily& reduced, const BrakeBranchProblem& problem,
                        const ContinuationSettings& continuation)
@@ -266,14 +162,9 @@ void trace_on_reduced_model(BrakeFamily& full, const BrakeBranchProblem& problem
     found.branch = trace_by_itself(reduced, problem, continuation);
     check_on_full_model(full, reduced, found.branch, seen);
     const auto active = seen.roles({}).active.size(), had = reduced.model().active.size();
-    found.reduction = {reduced.model().size(),
-                       static_cast<int>(had),
-                       static_cast<int>(active - had),
-                       reduced.interpolation_error(),
-                       {}};
-    if (active > had && round < rounds) continue;
-    found.reduction->corrections = corrected_points(full, reduced, problem, continuation, found.branch);
-    return;
+    found.reduction = {reduced.model().size(), static_cast<int>(had), static_cast<int>(active - had),
+                       reduced.interpolation_error()};
+    if (active <= had || round == rounds) return;
   }
 }
 
@@ -344,7 +235,6 @@ BrakeBranch find_branch(const BrakeBranchProblem& problem)
   if (!try_reduced_model(family, problem, continuation, found))
     found.branch =
         trace_branch(family.flows(), continuation, problem.shooting, problem.cycle.orbit, problem.settings.own);
-  found.coexistence = coexistence_of(found.branch, problem.stability);
   if (found.outcome.kind == OutcomeKind::refused) return found;
   found.outcome = outcome_of(problem, found);
   const std::vector<BranchEvent>& hopf = problem.stability.hopf;

@@ -323,24 +323,6 @@ Branch without_start(long periods)
   return branch;
 }
 
-} // namespace
-
-std::optional<BranchPoint> close_orbit(const FlowFamily& family, const ContinuationSettings& settings,
-                                       const ShootingOptions& options, const Orbit& start, double parameter)
-{
-  Progress progress(comm_of(displacement(start.state)), "corrections", 20);
-  ConvergenceLog log{progress};
-  BranchCorrector corrector{family, settings, options, log};
-  corrector.scales.parameter = settings.greatest - settings.least;
-  std::optional<CorrectedOrbit> closed = correct_start(corrector, start, parameter);
-  if (!closed) return {};
-  ExaminedOrbit examined = examine(corrector, std::move(*closed), Examined::measures_alone);
-  return point_of(examined);
-}
-
-namespace
-{
-
 /// Drops neighbouring folds that are no further apart than the residual, as a part of the range, leaves a parameter
 /// unknown: a branch of hardly any amplitude turns by that much.
 void drop_folds_of_residuals(const ContinuationSettings& settings, std::vector<BranchEvent>& events)

@@ -325,12 +325,6 @@ Owned<Vec> ReducedFamily::lifted(const VectorXd& state) const
   return result;
 }
 
-Preconditioner ReducedFamily::lifted_preconditioner(double period, const VectorXd& state)
-{
-  lifted_correction_ = monodromy_correction(at_->map, period, {state.head(own_.size()), state.tail(own_.size())});
-  return preconditioner_of(lifted_correction_, coordinates_in(own_, problem_.sliding.structure));
-}
-
 SlowMotions ReducedFamily::slow_motions(double period, Vec start)
 {
   ReducedMap& map = at_->map;
@@ -342,7 +336,7 @@ SlowMotions ReducedFamily::slow_motions(double period, Vec start)
   SlowMotions slow = slow_motions_of(spectrum, own_, own_coordinates(), start);
   slow.periods = 2;
   add_changes(multipliers_along(spectrum, map, period, moved), 1, slow);
-  slow.confirmed = [] { return true; }; // these are its own
+  slow.confirmed = true; // these are its own
   return slow;
 }
 
@@ -369,9 +363,9 @@ PointMeasures ReducedFamily::measure(const Orbit& orbit)
   (void)integrate(map, orbit.period, start, watch);
   for (Index i = 0; i < probes; ++i) measures.peak_to_peak.push_back(most[i] - least[i]);
   std::vector<std::vector<ContactStatus>> statuses;
-  for (const RecordedContact& contact : record_contacts(map, orbit.period, start))
-    statuses.push_back(contact_status(PairView<const double>(contact.r, model.directions),
-                                      PairView<const double>(contact.w, model.directions), model.friction));
+  for (const StepRecord& contact : record_contacts(map, orbit.period, start))
+    statuses.push_back(contact_status(PairView(contact.reactions, model.directions),
+                                      PairView(contact.contact_velocity, model.directions), model.friction));
   count_statuses(statuses, measures);
   measures.slips_nonlinearly = depends_on_speed(model.friction);
   double open = 0;

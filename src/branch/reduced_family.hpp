@@ -53,8 +53,6 @@ public:
   Orbit reduced(const Orbit& orbit);
   /// A state (q, v) as one of the full model. Collective.
   Owned<Vec> lifted(const Eigen::VectorXd& state) const;
-  /// P^-1 on the full model by the monodromy matrix of the period set last. Borrows the object. Collective.
-  Preconditioner lifted_preconditioner(double period, const Eigen::VectorXd& state);
 
 private:
   struct At // a value of the parameter
@@ -84,10 +82,9 @@ private:
   std::vector<ReducedBrake> samples_;
   double interpolation_error_ = 0;
   std::unique_ptr<At> at_;
-  std::vector<RecordedContact> recorded_;
+  std::vector<StepRecord> recorded_;
   std::optional<ReducedMap> other_grid_; // of the recorded steps, where it is not the map's own
-  MonodromyCorrection correction_;       // of the flows
-  MonodromyCorrection lifted_correction_;
+  MonodromyCorrection correction_;
 };
 
 } // namespace squeal

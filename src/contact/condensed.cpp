@@ -102,8 +102,7 @@ Factor factor_held(Mat A, const Interface& interface, const DofNames& names, con
   auto [factor, loose, indefinite, resistance] = factor_positive(A, interface, options);
   if (loose)
     throw Error((indefinite ? "not positive definite: driven on, not back, is" : "singular: nothing resists") +
-                (" a motion that is largest at " + describe(names, *loose, comm_of(A))) +
-                "; give it a support, a spring or mass");
+                (" a motion that is largest at " + describe(names, *loose)) + "; give it a support, a spring or mass");
   return std::move(factor);
 }
 

@@ -159,7 +159,8 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
     compliant = compliant || contact.compliance > 0;
     elastic = elastic || contact.slip_compliance > 0;
   }
-  std::vector<SparseRow> rows; // all of them, on rank 0
+  std::vector<SparseRow> rows; // of this rank's pairs
+  const auto [first, last] = local_range(interface.pairs, comm);
   for (const ContactPair& pair : pairs)
   {
     const Contact& contact = scene.contacts[static_cast<std::size_t>(pair.contact)];
@@ -174,7 +175,8 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
     const double area = pair.area > 0 ? pair.area : 1;
     if (compliant) interface.compliance.push_back(contact.compliance / area);
     if (elastic) interface.slip_compliance.push_back(contact.slip_compliance / area);
-    if (rank_of(comm) != 0) continue;
+    if (const auto place = static_cast<PetscInt>(interface.geometry.size()) - 1; place < first || place >= last)
+      continue;
     axes.insert(axes.begin(), pair.normal);
     for (const Vec3& axis : axes)
     {
@@ -183,7 +185,7 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
     }
   }
   add_shifts(interface, scene, dofs, comm);
-  interface.B = matrix_of_rows(scattered_rows(std::move(rows), interface.pairs, comm), dofs.last - dofs.first, comm);
+  interface.B = matrix_of_rows(rows, dofs.last - dofs.first, comm);
   check_interface(interface, "contact", comm);
   return interface;
 }

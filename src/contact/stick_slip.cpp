@@ -239,17 +239,20 @@ void StatusSystem::factor(const Softening& soft)
   const PairRows<Index> rows(of_.directions);
   const auto size = static_cast<Index>(rows_.size());
   const bool whole = of_.M.size() > 0;
-  MatrixXd matrix(size, size);
+  MatrixXd matrix(size, size), of_pair(size, own_);
   for (std::size_t i = 0; i < unknown_.size(); ++i)
   {
     const auto& [R, W] = laws_[unknown_[i]];
     const Index first = rows.normal(static_cast<Index>(unknown_[i])), to = rows.normal(static_cast<Index>(i));
-    const auto of_pair = Eigen::seqN(first, own_);
     auto columns = matrix.middleCols(to, own_);
-    const MatrixXd reaction = (R - soft.spring * W).topLeftCorner(own_, own_);
-    columns.noalias() = of_.N(rows_, of_pair) * -W.topLeftCorner(own_, own_);
+    const MatrixXd motion = -W.topLeftCorner(own_, own_), reaction = (R - soft.spring * W).topLeftCorner(own_, own_);
+    of_pair = of_.N.middleCols(first, own_)(rows_, Eigen::all);
+    columns.noalias() = of_pair.lazyProduct(motion);
     if (whole)
-      columns.noalias() += of_.M(rows_, of_pair) * reaction;
+    {
+      of_pair = of_.M.middleCols(first, own_)(rows_, Eigen::all);
+      columns.noalias() += of_pair.lazyProduct(reaction);
+    }
     else
       columns.middleRows(to, own_) += reaction;
     for (Index k = 0; k < own_; ++k) // a row in which neither side moves leaves its friction open: it stays
@@ -341,19 +344,35 @@ struct Increment
     return residual <= enough || !std::isfinite(at.r.sum() + at.w.sum());
   }
 
-  /// Newton's method on the statuses, which near a solution ends in a few iterations.
-  void by_statuses(StickSlipState at)
-  {
-    constexpr int most = 12;
-    for (int iteration = 0; !ends_at(at, tight) && iteration < most; ++iteration, ++best.iterations)
-      at = beyond(at, 1, StatusSystem(of, friction, at).change(rest(at, 0, at.w), {}));
-  }
-
   /// The sum of squares that a smoothed step lessens [N^2].
   double merit(const StickSlipState& at, double smooth, const VectorXd& lacking) const
   {
     const double per_force = of.M.size() > 0 ? of.compliance : 1;
     return PairStates{of, friction, at, smooth}.defects().squaredNorm() + (lacking / per_force).squaredNorm();
+  }
+
+  /// The part of a step by which the merit falls from that where `now` is lacking; `least` where no part lessens it.
+  double part_of(const StickSlipState& at, const StickSlipState& change, double smooth, const VectorXd& now,
+                 double least) const
+  {
+    const double size = merit(at, smooth, now);
+    const auto lessens = [&](double part)
+    { return merit(beyond(at, part, change), smooth, (1 - part) * now) < (1 - 1e-4 * part) * size; };
+    double part = 1;
+    while (part > least && !lessens(part)) part /= 2;
+    return part;
+  }
+
+  /// Newton's method on the statuses, which near a solution ends in a few iterations.
+  void by_statuses(StickSlipState at)
+  {
+    constexpr int most = 12;
+    for (int iteration = 0; !ends_at(at, tight) && iteration < most; ++iteration, ++best.iterations)
+    {
+      const VectorXd now = rest(at, 0, at.w);
+      const StickSlipState change = StatusSystem(of, friction, at).change(now, {});
+      at = beyond(at, part_of(at, change, 0, now, 0x1p-8), change);
+    }
   }
 
   /// The path of laws with rounded corners to those of Coulomb (src/README.md, section 2.9).
@@ -380,13 +399,9 @@ void Increment::by_smoothing(StickSlipState at)
       from = at.w;
     }
     const VectorXd now = lacking();
-    const double size = merit(at, soft.force, now);
     const StickSlipState change = StatusSystem(of, friction, at, soft).change(now, soft);
-    double part = 1;
-    const auto lessens = [&]
-    { return merit(beyond(at, part, change), soft.force, (1 - part) * now) < (1 - 1e-4 * part) * size; };
-    while (part >= least_part && !lessens()) part /= 2;
-    if (part < least_part) return; // rounding
+    const double part = part_of(at, change, soft.force, now, least_part);
+    if (part == least_part) return; // rounding
     at = beyond(at, part, change);
   }
 }
@@ -399,7 +414,7 @@ StickSlipSolution solve_stick_slip(const StickSlipOperator& of, const StickSlipF
   Increment increment{of, friction, q, {guess, 0, std::numeric_limits<double>::infinity(), false}};
   increment.by_statuses(guess);
   if (increment.best.converged || of.motion(q) == 0) return increment.best;
-  increment.by_smoothing({VectorXd::Zero(q.size()), guess.w});
+  increment.by_smoothing(guess);
   increment.by_statuses(StickSlipState(increment.best.state));
   return increment.best;
 }

@@ -59,7 +59,8 @@ void note_model_errors(const CycleCorrection& correction, FittedCycle& found)
 /// the accuracy needs. It does not answer where that shooting left the reduced cycle.
 FittedCycle correct_on_full_model(const ReducedSearch& search, const ReducedCycle& reduced, StepChoice steps)
 {
-  const CycleProblem& problem = search.problem;
+  CycleProblem problem = with_settings(search.problem, search.problem.settings);
+  problem.reduced = &search.model;
   const Preconditioner preconditioner =
       preconditioner_of(search.correction, coordinates_in(search.model, problem.sliding.structure));
   const Owned<Vec> state = full_motion(search, reduced.state);
@@ -119,6 +120,22 @@ FittedCycle find_by_reduced_model(ReducedSearch& search, StepChoice steps)
   return found;
 }
 
+/// The settings, with steps and tolerance where the scene leaves them open.
+CycleSettings chosen_settings(const CycleProblem& problem, const FidelityRequest& request)
+{
+  CycleSettings settings = problem.settings;
+  const bool chooses = request.model == CycleModel::automatic;
+  if (settings.tolerance == 0) settings.tolerance = plain_tolerance;
+  if (settings.steps_per_period > 0) return settings;
+  const double turns = problem.given_period * problem.unstable.modes.front().frequency_hz(); // of the mode, if given
+  settings.steps_per_period =
+      (chooses ? request.begin_steps : plain_steps) * std::max(1, static_cast<int>(std::lround(turns)));
+  while (chooses && settings.steps_per_period < most_steps &&
+         !step_refusal_of(problem, settings.steps_per_period).empty())
+    settings.steps_per_period *= 2;
+  return settings;
+}
+
 /// Lets `search` find the cycle with the chosen settings, unless these are refused. A cycle that answers is saved.
 FittedCycle
 find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, Fidelity fidelity,
@@ -148,21 +165,6 @@ find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, Fid
 }
 
 } // namespace
-
-CycleSettings chosen_settings(const CycleProblem& problem, const FidelityRequest& request)
-{
-  CycleSettings settings = problem.settings;
-  const bool chooses = request.model == CycleModel::automatic;
-  if (settings.tolerance == 0) settings.tolerance = plain_tolerance;
-  if (settings.steps_per_period > 0) return settings;
-  const double turns = problem.given_period * problem.unstable.modes.front().frequency_hz(); // of the mode, if given
-  settings.steps_per_period =
-      (chooses ? request.begin_steps : plain_steps) * std::max(1, static_cast<int>(std::lround(turns)));
-  while (chooses && settings.steps_per_period < most_steps &&
-         !step_refusal_of(problem, settings.steps_per_period).empty())
-    settings.steps_per_period *= 2;
-  return settings;
-}
 
 std::string no_reduced_search(const CycleProblem& problem)
 {

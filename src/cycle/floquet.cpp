@@ -54,6 +54,12 @@ std::vector<PairHistory> histories(const Interface& interface, std::span<const s
   return pairs;
 }
 
+/// Whether the pair came to rest or slid otherwise than it does at the equilibrium.
+bool leaves_drive(const PairHistory& pair, bool undriven)
+{
+  return pair.turned || (pair.stuck && !undriven);
+}
+
 /// Pairs whose status changes are active, those that always slide, or stick without a drive, are eliminated.
 PairRoles roles_of(const std::vector<PairHistory>& pairs, const Interface& interface, std::size_t steps)
 {
@@ -63,13 +69,28 @@ PairRoles roles_of(const std::vector<PairHistory>& pairs, const Interface& inter
   {
     reactions.normal(i) = pairs[i].reaction / static_cast<double>(steps);
     if (!pairs[i].closed) continue;
-    const bool changes = is_undriven(interface, i) ? pairs[i].turned : pairs[i].stuck || pairs[i].turned;
-    if (pairs[i].opened || changes)
+    if (pairs[i].opened || leaves_drive(pairs[i], is_undriven(interface, i)))
       roles.active.push_back(static_cast<int>(i));
     else
       roles.sliding[i] = 1;
   }
   return roles;
+}
+
+/// Whether the model's pairs may do what these did.
+bool holds(const ReducedModel& model, const std::vector<PairHistory>& pairs, const Interface& interface)
+{
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+  {
+    const PairHistory& pair = pairs[i];
+    const bool changes = leaves_drive(pair, is_undriven(interface, i)),
+               active = std::ranges::binary_search(model.active, static_cast<int>(i));
+    const bool fits = active             ? model.directions > 0 || !changes
+                      : model.sliding[i] ? !pair.opened && !changes
+                                         : !pair.closed;
+    if (!fits) return false;
+  }
+  return true;
 }
 
 /// The recorded periods of a cycle: its own, one with the grid of time moved by half a step, one of other steps.
@@ -161,36 +182,36 @@ RealModes modes_beyond_band(const CycleProblem& problem)
   return real_modes_beyond(problem, far * frequency);
 }
 
-/// The number of motions that pairs which slide, or stick without a drive, throughout take away.
-int eliminated_motions(const CycleProblem& problem, const RecordedPeriods& periods)
+/// The number of motions that the pairs which the model eliminates take away.
+int eliminated_motions(const ReducedModel& model, const Interface& interface)
 {
-  const Interface& interface = problem.sliding.interface;
-  const PairRoles roles = roles_of(histories(interface, periods.records), interface, 1);
   int motions = 0;
-  for (std::size_t i = 0; i < roles.sliding.size(); ++i)
-    motions += roles.sliding[i] ? 1 + (is_undriven(interface, i) ? interface.directions : 0) : 0;
+  for (std::size_t i = 0; i < model.sliding.size(); ++i)
+    motions += model.sliding[i] ? 1 + (is_undriven(interface, i) ? interface.directions : 0) : 0;
   return motions;
 }
 
-/// Why a model of so many shapes is not made; empty: it takes no more than `part` of the free memory.
-std::string lack_of_memory(const Structure& structure, Index shapes, double part)
+/// Why a model of so many shapes is not made; empty: it fits the free memory.
+std::string lack_of_memory(const Structure& structure, Index shapes)
 {
   PetscInt dofs = 0;
   check(VecGetSize(structure.load, &dofs));
   const double needed = memory_of_reduction(dofs, static_cast<double>(shapes)),
                free = free_memory(comm_of(structure.load));
-  if (needed <= part * free) return {};
+  if (needed <= free) return {};
   return format("a reduced model of %ld shapes takes %.3g GB, and %.3g GB are free: a larger machine would decide",
                 static_cast<long>(shapes), 1e-9 * needed, 1e-9 * free);
 }
 
-/// The reduced model for the recorded periods; null where it does not fit this part of the free memory, with the
-/// reason.
-std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const RecordedPeriods& periods, double part,
+/// The reduced model for the recorded periods, that of the start where it holds them; null where none fits the free
+/// memory, with the reason.
+std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const RecordedPeriods& periods,
                                               std::string& missing)
 {
   const Interface& interface = problem.sliding.interface;
   const std::vector<PairHistory> pairs = histories(interface, periods.records);
+  if (problem.reduced && holds(*problem.reduced, pairs, interface))
+    return {std::shared_ptr<const ReducedModel>(), problem.reduced}; // borrowed
   std::size_t steps = 0;
   for (const auto& records : periods.records) steps += records.size();
   const PairRoles roles = roles_of(pairs, interface, steps);
@@ -206,29 +227,25 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   const std::size_t forces =
       std::min(follow ? roles.active.size() : rows, static_cast<std::size_t>(attachments_on_recorded_contact));
   missing = lack_of_memory(problem.sliding.structure,
-                           static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces), part);
+                           static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces));
   if (!missing.empty()) return nullptr;
-  constexpr double highest = 0.25; // of the modes: what they change says what those beyond them may
   auto model = std::make_shared<ReducedModel>(
       reduce(problem.sliding, problem.modes, roles,
              {static_cast<int>(problem.modes.size()), 1e-5, attachments_on_recorded_contact, follow, &beyond,
-              problem.step.factor, highest}));
-  // more pairs may be closed than the shapes can tell apart (section 7.2)
-  for (Index i = 0; i < model->of_left_out.size(); ++i)
-    model->compliance[static_cast<std::size_t>(i)] += model->of_left_out(i);
+              problem.step.factor, kept_apart}));
   return_freed_memory(); // of the factor that gave the attachments
   return model;
 }
 
-/// What the grid of time changes the modulus of each value of the spectrum by. A step of order 2 on grids of n and 2 n
-/// steps has 4/3 of the difference as its error; events of contact, of order 1, show in the moved grid, too.
-void set_grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, int other_steps, double period,
-                     const std::function<std::vector<RecordedContact>(int)>& contacts, SlowMotions& slow)
+/// What the grid of time changes the modulus of each value of the spectrum by: one moved by half a step, and one of
+/// other steps.
+void set_grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, const OtherSteps& other, double period,
+                     const std::function<std::vector<StepRecord>(int)>& contacts, SlowMotions& slow)
 {
   add_changes(multipliers_along(spectrum, map, period, contacts(RecordedPeriods::moved)), 1, slow);
-  if (other_steps == 0) return;
-  ReducedMap other{map.model, other_steps, map.theta, map.comm};
-  add_changes(multipliers_along(spectrum, other, period, contacts(RecordedPeriods::other)), 4. / 3, slow);
+  if (other.steps == 0) return;
+  ReducedMap finer{map.model, other.steps, map.theta, map.comm};
+  add_changes(multipliers_along(spectrum, finer, period, contacts(RecordedPeriods::other)), other.part, slow);
 }
 
 /// Whether the model has as many shapes as the structure has motions.
@@ -238,7 +255,7 @@ bool holds_every_motion(const ReducedModel& model, int eliminated, Vec state)
 }
 
 /// Whether three quarters of the shapes give as many multipliers above 0.95.
-bool confirmed_by_fewer_shapes(const ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+bool confirmed_by_fewer_shapes(const ReducedMap& map, double period, std::span<const StepRecord> contacts,
                                const std::vector<Complex>& values)
 {
   const ReducedModel smaller = truncated(map.model, (3 * map.model.size() + 3) / 4);
@@ -248,7 +265,7 @@ bool confirmed_by_fewer_shapes(const ReducedMap& map, double period, std::span<c
 
 /// Whether the model without its highest modes has the same multipliers above 0.95. The attachments stay: friction on
 /// pairs without their own flexibility is another problem.
-bool confirmed_by_fewer_modes(const ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+bool confirmed_by_fewer_modes(const ReducedMap& map, double period, std::span<const StepRecord> contacts,
                               const std::vector<Complex>& values)
 {
   const ReducedModel smaller = without_modes_apart(map.model);
@@ -256,13 +273,14 @@ bool confirmed_by_fewer_modes(const ReducedMap& map, double period, std::span<co
   return alike(0.95, values, large_multipliers(few, period, contacts, deciding_values).values);
 }
 
-SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, int other_steps, double period, Vec start)
+SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, const OtherSteps& other, double period,
+                               Vec start)
 {
   const MPI_Comm comm = comm_of(problem.sliding.structure.load);
-  const RecordedPeriods periods = record_periods(map, other_steps, period, start);
+  const RecordedPeriods periods = record_periods(map, other.steps, period, start);
   SlowMotions none;
-  none.periods = other_steps > 0 ? 3 : 2;
-  const auto model = model_for(problem, periods, 1, none.missing);
+  none.periods = other.steps > 0 ? 3 : 2;
+  const auto model = model_for(problem, periods, none.missing);
   if (!model) return none;
   const auto contacts = [&](int which)
   {
@@ -270,7 +288,7 @@ SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, int 
                              periods.records[static_cast<std::size_t>(which)]);
   };
   ReducedMap own{*model, map.steps, map.theta, comm};
-  auto recorded = contacts(RecordedPeriods::own);
+  const auto recorded = contacts(RecordedPeriods::own);
   const ReducedSpectrum spectrum = large_multipliers(own, period, recorded, deciding_values);
   // no motion beside a cycle that shooting finds doubles in a period: shapes that do not fit friction do
   if (!spectrum.values.empty() && std::abs(spectrum.values.front()) > 2)
@@ -281,15 +299,11 @@ SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, int 
   const ReducedCoordinates coordinates = coordinates_in(*model, problem.sliding.structure);
   SlowMotions slow = slow_motions_of(spectrum, *model, coordinates, start);
   slow.periods = none.periods;
-  set_grid_errors(spectrum, own, other_steps, period, contacts, slow);
+  set_grid_errors(spectrum, own, other, period, contacts, slow);
   slow.without_known = taking_out_known(spectrum, coordinates);
-  const bool whole = holds_every_motion(*model, eliminated_motions(problem, periods), start);
-  slow.confirmed = [=, steps = map.steps, theta = map.theta, recorded = std::move(recorded), values = spectrum.values]
-  {
-    const ReducedMap along{*model, steps, theta, comm};
-    return whole || confirmed_by_fewer_shapes(along, period, recorded, values) ||
-           confirmed_by_fewer_modes(along, period, recorded, values);
-  };
+  slow.confirmed = holds_every_motion(*model, eliminated_motions(*model, problem.sliding.interface), start) ||
+                   confirmed_by_fewer_shapes(own, period, recorded, spectrum.values) ||
+                   confirmed_by_fewer_modes(own, period, recorded, spectrum.values);
   slow.correct = [model, correct = std::move(slow.correct)](Complex m, Vec real, Vec imaginary)
   { correct(m, real, imaginary); };
   return slow;
@@ -297,32 +311,17 @@ SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, int 
 
 } // namespace
 
-void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_steps, Flow& flow)
+void add_slow_motions(const CycleProblem& problem, PeriodMap& map, const OtherSteps& other, Flow& flow)
 {
-  flow.slow_motions = [&problem, &map, other_steps](double period, Vec start)
-  { return slow_motions_along(problem, map, other_steps, period, start); };
+  flow.slow_motions = [&problem, &map, other](double period, Vec start)
+  { return slow_motions_along(problem, map, other, period, start); };
 }
 
-Preconditioner recorded_preconditioner(const CycleProblem& problem, const PeriodMap& map, double period, Vec rate)
+OtherSteps steps_to_compare(const Structure& structure, int steps)
 {
-  const auto& [structure, interface, equilibrium] = problem.sliding;
-  RecordedPeriods periods;
-  periods.records[RecordedPeriods::own] = contact_of(map.records);
-  std::string missing;
-  const auto model = model_for(problem, periods, memory_for_shapes(1), missing); // it is kept while shooting
-  if (!model) return {};
-  ReducedMap reduced{*model, map.steps, map.theta, comm_of(structure.load)};
-  const auto contacts = recorded_contacts(*model, interface.directions, periods.records[RecordedPeriods::own]);
-  const MatrixXd columns = monodromy(reduced, period, contacts);
-  const auto correction = std::make_shared<const MonodromyCorrection>(
-      monodromy_correction(*model, columns, coordinates(*model, structure, displacement(rate), velocity(rate))));
-  return [model, correction, apply = preconditioner_of(*correction, coordinates_in(*model, structure))](
-             double T, Vec x, Vec y) { apply(T, x, y); };
-}
-
-int steps_to_compare(const Structure& structure, int steps)
-{
-  return is_dear(steps * work_of_step(structure)) && steps <= enough_steps ? 2 * steps : 0;
+  constexpr double of_order_2 = 4. / 3, of_order_1 = 2;
+  if (!is_dear(steps * work_of_step(structure))) return {2 * steps + 1, of_order_1};
+  return steps <= enough_steps ? OtherSteps{2 * steps, of_order_2} : OtherSteps{};
 }
 
 int steps_of_verdict(const Structure& structure, int steps)
@@ -336,7 +335,9 @@ Verdict examine(const CycleProblem& problem, const CycleOptions& options, const 
   PeriodMap map{problem.sliding, problem.step, judged, cycle.theta};
   map.reactions = problem.sliding.equilibrium.reactions;
   Flow flow = flow_of(map);
-  add_slow_motions(problem, map, steps > judged ? steps : steps_to_compare(problem.sliding.structure, steps), flow);
+  const OtherSteps other =
+      steps > judged ? OtherSteps{steps, 4. / 3} : steps_to_compare(problem.sliding.structure, steps);
+  add_slow_motions(problem, map, other, flow);
   const Orbit& orbit = cycle.orbit;
   const Preconditioner none;
   const OrbitProblem found = problem_of(flow, none, {problem.sliding.equilibrium.u, nullptr, nullptr, orbit.period},

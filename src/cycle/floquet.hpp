@@ -6,18 +6,20 @@
 namespace squeal
 {
 
-/// Gives the flow the slow motions of the map. Errors hold what `other_steps` steps a period change; 0: none are
-/// compared. Borrows problem, options and map.
-void add_slow_motions(const CycleProblem& problem, PeriodMap& map, int other_steps, Flow& flow);
+/// The steps a period of a recording that tells the error of another, and the part of a change on it that is taken for
+/// that.
+struct OtherSteps
+{
+  int steps = 0; // 0: none is made
+  double part = 0;
+};
 
-/// The preconditioner of the reduced model (section 7.6) on the contact of the period that the map recorded last;
-/// `rate` is its dPhi/dT. Empty where that model would take more than half of the free memory. Borrows the problem.
-/// Error: as of reduce.
-Preconditioner recorded_preconditioner(const CycleProblem& problem, const PeriodMap& map, double period, Vec rate);
+/// Gives the flow the slow motions of the map. Errors hold what these other steps change. Borrows problem and map.
+void add_slow_motions(const CycleProblem& problem, PeriodMap& map, const OtherSteps& other, Flow& flow);
 
-/// The number of steps a period that tells the error of another: twice as many of few where periods are dear and no
-/// verdict at finer steps follows, else 0. Collective.
-int steps_to_compare(const Structure& structure, int steps);
+/// Twice as many and one more, which place each event at other points of its step: contact that hits or sticks has an
+/// error of first order. Where periods are dear, twice as many of few, by a step's order 2, or none. Collective.
+OtherSteps steps_to_compare(const Structure& structure, int steps);
 
 /// The number of steps a period at which an orbit is judged: its own, or enough_steps where as many are dear.
 /// Collective.

@@ -42,9 +42,10 @@ void add_remedies(const PeriodMap& map, Outcome& outcome)
         (outcome.reason.empty() ? "" : "; ") + std::to_string(map.unconverged) + " steps left the contact unconverged";
 }
 
-/// Shoots from the start with the preconditioner that `make` returns for the map and its flow; it may move the start.
-template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, const CycleOptions& options,
-                                                const ShootingStart& start, Make make, int free_periods)
+} // namespace
+
+LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
+                           const Preconditioner& preconditioner, int free_periods)
 {
   const CycleSettings& settings = problem.settings;
   PeriodMap map{problem.sliding, problem.step, settings.steps_per_period, settings.theta};
@@ -54,7 +55,6 @@ template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, con
   add_slow_motions(problem, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
   CycleKeeper keeper(problem.sliding.structure);
   keeper.watch(flow);
-  const Preconditioner& preconditioner = make(map, flow);
   ShootingResult found = shoot(flow, preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
   LimitCycle cycle{std::move(found.outcome),
                    settings.steps_per_period,
@@ -85,21 +85,11 @@ template <class Make> LimitCycle shoot_at_cycle(const CycleProblem& problem, con
   return cycle;
 }
 
-} // namespace
-
-LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
-                           const Preconditioner& preconditioner, int free_periods)
-{
-  return shoot_at_cycle(
-      problem, options, start, [&](PeriodMap&, Flow&) -> const Preconditioner& { return preconditioner; },
-      free_periods);
-}
-
 CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings)
 {
-  return {problem.sliding, problem.linearised,   problem.modes,         problem.unstable,
-          settings,        problem.step,         problem.modes_options, problem.probes,
-          problem.given,   problem.given_period, problem.given_rounds,  problem.resumed};
+  return {problem.sliding,      problem.linearised,    problem.modes,  problem.unstable, settings,
+          problem.step,         problem.modes_options, problem.probes, problem.given,    problem.given_period,
+          problem.given_rounds, problem.resumed,       problem.reduced};
 }
 
 std::vector<State> other_unstable_motions(const CycleProblem& problem)
@@ -118,53 +108,6 @@ std::vector<Owned<Vec>> other_unstable_states(const CycleProblem& problem)
   for (const State& motion : other_unstable_motions(problem)) states.push_back(state_of(motion.u, motion.v));
   return states;
 }
-
-namespace
-{
-
-/// From a start next to the cycle: one period carries it on, and the contact of that gives the preconditioner. The
-/// shapes of that make room for those of the multipliers; a search that goes on beyond them takes the estimated one.
-LimitCycle find_cycle_near(const CycleProblem& problem, const CycleOptions& options, ShootingStart start)
-{
-  Owned<Vec> end;
-  Preconditioner at_hand;
-  const auto prepare = [&](PeriodMap& map, Flow& flow)
-  {
-    const Owned<Vec> state = state_of(start.u, start.v), rate = zeros_like(state);
-    end = zeros_like(state);
-    flow.integrate(start.period, state, end, rate);
-    flow.record_period(start.period, state, {});
-    start.u = displacement(end);
-    start.v = velocity(end);
-    try
-    {
-      at_hand = recorded_preconditioner(problem, map, start.period, rate);
-    }
-    catch (const LibraryError&) // perhaps on this rank alone
-    {
-      throw;
-    }
-    catch (const Error&) // on every rank alike: there is no such model of this structure
-    {
-    }
-    flow.slow_motions = [&at_hand, find = flow.slow_motions](double period, Vec x)
-    {
-      at_hand = {};
-      return find(period, x);
-    };
-    return Preconditioner(
-        [&](double period, Vec x, Vec y)
-        {
-          if (!at_hand) at_hand = estimated_preconditioner(problem, options.band_factor);
-          apply(at_hand, period, x, y);
-        });
-  };
-  LimitCycle cycle = shoot_at_cycle(problem, options, start, prepare, 0);
-  ++cycle.convergence.periods;
-  return cycle;
-}
-
-} // namespace
 
 std::optional<State> cycle_start(const CycleProblem& problem)
 {
@@ -224,8 +167,6 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
                       is_cycle,
                       problem.given_rounds};
   start.other_unstable = other_unstable_states(problem);
-  if (is_cycle && problem.settings.start.kind == CycleStartKind::coarse)
-    return find_cycle_near(problem, options, std::move(start));
   return find_cycle_from(problem, options, start, estimated_preconditioner(problem, options.band_factor),
                          is_cycle ? 0 : problem.settings.free_periods);
 }

@@ -73,6 +73,13 @@ double highest_joining(const ReducedSearch& search)
   return factor * search.problem.unstable.modes.front().frequency_hz();
 }
 
+/// Attachments at most. The start of a search on the full model needs no more than the vectors of its multipliers do; a
+/// cycle that is the answer needs all.
+PetscInt attachments_of(const ReducedSearch& search)
+{
+  return search.fidelity.asked == CycleModel::reduced ? all_attachments : attachments_on_recorded_contact;
+}
+
 /// Makes the reduced model of the active pairs, for motions up to an amplitude of the followed mode.
 void build_model(ReducedSearch& search, double amplitude)
 {
@@ -88,7 +95,8 @@ void build_model(ReducedSearch& search, double amplitude)
     const ReducedModel released = std::move(search.model); // before the next one takes memory
   }
   search.model = reduce(problem.sliding, problem.modes, search.active,
-                        {search.options.reduced_modes, new_attachment, 0, sliding, &search.real, problem.step.factor});
+                        {search.options.reduced_modes, new_attachment, attachments_of(search), sliding, &search.real,
+                         problem.step.factor, kept_apart});
   search.energy = energy_matrices(search.model);
   describe_model(search);
   search.fidelity.reduction_seconds += MPI_Wtime() - clock;
@@ -266,8 +274,9 @@ std::string size_refusal(const ReducedSearch& search)
   const CycleProblem& problem = search.problem;
   PetscInt dofs = 0;
   check(VecGetSize(problem.sliding.structure.load, &dofs));
+  const std::size_t rows = PairRows<std::size_t>(problem.sliding.interface.directions).rows_of(search.active.size());
   const std::size_t shapes = std::min(problem.modes.size(), static_cast<std::size_t>(search.options.reduced_modes)) +
-                             PairRows<std::size_t>(problem.sliding.interface.directions).rows_of(search.active.size());
+                             std::min(rows, static_cast<std::size_t>(attachments_of(search)));
   if (2 * shapes <= static_cast<std::size_t>(dofs)) return {};
   return "a reduced model of " + std::to_string(shapes) + " shapes is not small next to " + std::to_string(dofs) +
          " degrees of freedom";
@@ -319,7 +328,9 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
   const ComplexMode& mode = problem.unstable.modes.front();
   const std::optional<State> start = cycle_start(problem);
   if (!start) return "there is no amplitude to start from";
-  double amplitude = equivalent_amplitude(problem, *start);
+  constexpr double expected = 2.5; // times the start: to grow beyond it costs a second model and its periods
+  const double first = equivalent_amplitude(problem, *start);
+  double amplitude = expected * first;
   const Owned<Vec> estimated = fluctuation_of(problem, *start);
   Owned<Vec> motion = copy_of(estimated.get());
   search.real = real_modes_beyond(problem, highest_joining(search));
@@ -337,7 +348,7 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
     if (const std::string refusal = size_refusal(search); !refusal.empty()) return refusal;
     build_model(search, margin * amplitude);
     free.state = on_model(motion);
-    if (unit == 0) unit = doubled_energy(search.model, free.state) / 2 / (amplitude * amplitude);
+    if (unit == 0) unit = doubled_energy(search.model, free.state) / 2 / (first * first);
     run_until_periodic(search, free, 1.5 * unit * amplitude * amplitude);
     if (!std::isfinite(free.energy)) return "the motion of the reduced model grew beyond all bounds";
     const double reached = std::sqrt(free.energy / unit);

@@ -97,7 +97,7 @@ MatrixXd energy_representatives(const ReducedModel& model, const MatrixXd& left)
 
 } // namespace
 
-ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const StepRecord> contacts,
                                   const LargeValues& wanted)
 {
   const Index size = map.model.size(), slow = map.model.slow;
@@ -177,7 +177,7 @@ void add_changes(const std::vector<Complex>& others, double part, SlowMotions& s
 }
 
 std::vector<Complex> multipliers_along(const ReducedSpectrum& spectrum, ReducedMap& map, double period,
-                                       std::span<const RecordedContact> contacts)
+                                       std::span<const StepRecord> contacts)
 {
   const MatrixXd image = apply_tangent(map, period, contacts, spectrum.right);
   std::vector<Complex> values;

@@ -140,12 +140,12 @@ Held hold(const Structure& structure, const Interface& interface, const FactorOp
   }
   if (own.loose && own.indefinite)
     throw Error("equilibrium: the stiffness is not positive definite: a motion that is largest at " +
-                describe(structure.names, *own.loose, comm_of(structure.K)) +
+                describe(structure.names, *own.loose) +
                 " is driven on, not back, and the structure diverges (buckles) from any rest; look for a stiffness of "
                 "the wrong sign, or a load beyond the critical one");
   if (own.loose)
     throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
-                describe(structure.names, *own.loose, comm_of(structure.K)) + "; give it a support or a spring");
+                describe(structure.names, *own.loose) + "; give it a support or a spring");
   held.factor = std::move(own.factor);
   return held;
 }
@@ -162,7 +162,7 @@ Held hold_by_all_rows(const Structure& structure, const Interface& interface, co
   Factored factored = factor_positive(held.augmented, interface, options);
   if (factored.loose)
     throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
-                describe(structure.names, *factored.loose, comm_of(structure.K)) + "; give it a support or a spring");
+                describe(structure.names, *factored.loose) + "; give it a support or a spring");
   held.factor = std::move(factored.factor);
   return held;
 }

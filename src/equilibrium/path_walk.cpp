@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
+#include <utility>
 
 namespace squeal
 {
@@ -16,7 +18,10 @@ using Eigen::VectorXd;
 
 constexpr double least_part = 0x1p-20; // of a step: where a limit is known to
 constexpr double accurate = 1e-3;      // change of reactions by twice the increments
-constexpr int most_parts = 64;         // of a step
+constexpr int most_parts = 16;         // of a stretch
+
+/// A step is walked in stretches, the first to this part of it; each ends at four times the last one's end.
+constexpr double first_stretch = 0x1p-6;
 
 /// The place on the path: a step, and a part of it from its start.
 struct Place
@@ -69,18 +74,24 @@ VectorXd next_offset(const PathWalk& walk, int directions)
   return offset;
 }
 
-/// Takes the walk to a place in one increment. Returns whether there is a solution; else the walk is as it was.
-bool advance_to(const PathProblem& problem, const Place& place, PathWalk& walk)
+/// Takes the walk to a place by one increment of so much of the step. Returns whether there is a solution; else the
+/// walk is as it was.
+bool advance_to(const PathProblem& problem, const Place& place, double size, PathWalk& walk)
 {
   const StickSlipOperator& of = problem.of;
   const VectorXd offset = next_offset(walk, of.directions), q = load_at(problem, place) + of.N * offset;
   const StickSlipFriction friction = friction_at(problem, place);
-  StickSlipState guess = walk.state; // without slip
-  const PairView<double> slip(guess.w, of.directions);
+  StickSlipState start = walk.state; // without slip
+  const PairView<double> slip(start.w, of.directions);
   for (std::size_t pair = 0; pair < slip.pairs(); ++pair) std::ranges::fill(slip.tangential(pair), 0.);
+  StickSlipState guess = start;
+  if (walk.rate.r.size() > 0) guess = {start.r + size * walk.rate.r, start.w + size * walk.rate.w};
+  constexpr double rounding = 1e-9; // of reactions: where the rate leads to none, it tells no statuses
+  if (guess.r.lpNorm<Eigen::Infinity>() <= rounding * start.r.lpNorm<Eigen::Infinity>()) guess = start;
   StickSlipSolution found = solve_stick_slip(of, friction, q, guess);
   walk.iterations += found.iterations;
   if (!found.converged) return false;
+  walk.rate = {(found.state.r - start.r) / size, (found.state.w - start.w) / size};
   if (walk.increments > 0)
   {
     const VectorXd moved = (found.state.w - offset) - (walk.state.w - walk.offset);
@@ -96,24 +107,29 @@ bool advance_to(const PathProblem& problem, const Place& place, PathWalk& walk)
   return true;
 }
 
-/// The whole path with each step in so many parts, which are halved where there is no solution.
-PathWalk walk_in_parts(const PathProblem& problem, int parts)
+/// The whole path with each stretch in so many parts, which are halved where there is no solution. `first_rates`: from
+/// a walk before.
+PathWalk walk_in_parts(const PathProblem& problem, int parts, const std::vector<StickSlipState>& first_rates)
 {
   PathWalk walk = unloaded(problem);
   for (std::size_t step = 0; step < problem.ends.size(); ++step)
   {
-    double at = 0, part = 1. / parts;
-    while (at < 1)
+    walk.rate = step < first_rates.size() ? first_rates[step] : StickSlipState{};
+    double at = 0, begin = 0, share = 1;
+    for (double end = first_stretch; at < 1;)
     {
-      const double next = std::min(1., at + part);
-      if (advance_to(problem, {step, 1 - next < least_part ? 1. : next}, walk))
+      const double part = share * (end - begin) / parts, next = end - at - part < least_part ? end : at + part;
+      if (advance_to(problem, {step, next}, next - at, walk))
       {
-        at = walk.part;
-        part = std::min(2 * part, 1. / parts);
+        if (at == 0) walk.first_rates.push_back(walk.rate);
+        at = next;
+        share = std::min(2 * share, 1.);
+        if (at == end) begin = std::exchange(end, 4 * end);
         continue;
       }
-      part /= 2;
-      if (part >= least_part) continue;
+      share /= 2;
+      walk.rate = {};
+      if (part / 2 >= least_part) continue;
       walk.step = step;
       walk.part = at;
       return walk;
@@ -126,19 +142,16 @@ PathWalk walk_in_parts(const PathProblem& problem, int parts)
 /// The largest change of a reaction, over the largest of its contact; `least`: that counts as one [N].
 double change_between(const StickSlipOperator& of, const VectorXd& a, const VectorXd& b, double least)
 {
-  const PairView<const double> first(a, of.directions), second(b, of.directions);
-  std::vector<double> largest, change;
-  for (std::size_t pair = 0; pair < first.pairs(); ++pair)
+  const auto largest_in = [&](const VectorXd& r)
   {
-    const auto contact = static_cast<std::size_t>(of.contact[pair]);
-    largest.resize(std::max(largest.size(), contact + 1));
-    change.resize(largest.size());
-    for (std::size_t k = 0; k < first.of(pair).size(); ++k)
+    const auto size = [&](std::size_t pair)
     {
-      largest[contact] = std::max(largest[contact], std::abs(second.of(pair)[k]));
-      change[contact] = std::max(change[contact], std::abs(second.of(pair)[k] - first.of(pair)[k]));
-    }
-  }
+      const auto reaction = PairView<const double>(r, of.directions).of(pair);
+      return std::ranges::max(reaction | std::views::transform([](double x) { return std::abs(x); }));
+    };
+    return largest_of_contacts(of.contact, of.contact.size(), size);
+  };
+  const std::vector<double> largest = largest_in(b), change = largest_in(b - a);
   double worst = 0;
   for (std::size_t i = 0; i < change.size(); ++i)
     if (change[i] > 0) worst = std::max(worst, change[i] / std::max(largest[i], least));
@@ -151,12 +164,6 @@ bool has_no_scale(const PathProblem& problem)
   return problem.ends.size() == 1 && std::ranges::all_of(problem.gap, [](double gap) { return gap == 0; });
 }
 
-/// The sentence of a walk that ended early.
-std::string end_of(const PathProblem& problem, const PathWalk& walk)
-{
-  return format("there is no continuation beyond %.7g of step '%s'", walk.part, problem.ends[walk.step].name.c_str());
-}
-
 } // namespace
 
 PathWalk hold_at(const PathProblem& problem, const StickSlipState& from)
@@ -165,24 +172,31 @@ PathWalk hold_at(const PathProblem& problem, const StickSlipState& from)
   walk.state.r = from.r;
   walk.state.w.setZero();
   walk.offset += from.w;
-  walk.completed = advance_to(problem, {problem.ends.size() - 1, 1}, walk);
+  walk.completed = advance_to(problem, {problem.ends.size() - 1, 1}, 1, walk);
   if (!walk.completed) walk.reason = "there is no rest with the undriven pairs where they are";
   return walk;
 }
 
 PathWalk walk_path(const PathProblem& problem)
 {
-  PathWalk walk = walk_in_parts(problem, 1);
-  for (int parts = 2; walk.completed && !has_no_scale(problem); parts *= 2)
+  if (has_no_scale(problem))
   {
-    PathWalk finer = walk_in_parts(problem, parts);
+    PathWalk walk = unloaded(problem);
+    walk.completed = advance_to(problem, {0, 1}, 1, walk);
+    if (walk.completed) return walk;
+  }
+  PathWalk walk = walk_in_parts(problem, 1, {});
+  for (int parts = 2; walk.completed; parts *= 2)
+  {
+    PathWalk finer = walk_in_parts(problem, parts, walk.first_rates);
     constexpr double rounding = 1e-9;
     const double least = rounding * problem.of.motion(finer.q);
     finer.change = change_between(problem.of, walk.state.r, finer.state.r, least / problem.of.compliance);
+    finer.iterations += walk.iterations;
     const bool shrinks = finer.largest_move <= std::max(0.75 * walk.largest_move, least),
                jumps = finer.largest_move > std::max(0.9 * walk.largest_move, least);
     walk = std::move(finer);
-    if (parts > 2 && walk.change <= accurate && shrinks) break;
+    if (walk.change <= accurate && shrinks) break;
     if (parts < most_parts) continue;
     if (jumps && walk.completed)
     {
@@ -192,7 +206,9 @@ PathWalk walk_path(const PathProblem& problem)
     }
     break;
   }
-  if (!walk.completed && walk.reason.empty()) walk.reason = end_of(problem, walk);
+  if (!walk.completed && walk.reason.empty())
+    walk.reason =
+        format("there is no continuation beyond %.7g of step '%s'", walk.part, problem.ends[walk.step].name.c_str());
   return walk;
 }
 

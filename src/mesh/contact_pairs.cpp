@@ -6,7 +6,6 @@
 
 #include "dual_rows.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/base/packed.hpp"
 #include "squeal/mesh/frames.hpp"
 #include "squeal/mesh/row_motions.hpp"
 
@@ -299,16 +298,6 @@ ContactPairs make_pairs(const Mesh& mesh, const Scene& scene)
     add_given_gaps(mesh, contact, std::span(result.pairs).subspan(first));
   }
   return result;
-}
-
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PairNode, node, weight)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ContactPair, rotor_node, stator_node, node, position, normal, area, contact, gap,
-                                   nodes, slave_nodes)
-
-void broadcast_pairs(ContactPairs& contact, MPI_Comm comm)
-{
-  broadcast_packed(contact.pairs, comm);
-  broadcast(contact.coverage, comm);
 }
 
 } // namespace squeal

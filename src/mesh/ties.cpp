@@ -2,7 +2,6 @@
 
 #include "dual_rows.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/mesh/location.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>
@@ -69,76 +68,8 @@ TiedNode solved(const Mesh& mesh, const SlaveRow& row, int node, int tie)
   return result;
 }
 
-/// Whether the slave is a curve: the edge of a shell.
-bool is_edge(const Mesh& mesh, const std::string& name)
-{
-  return !mesh.surfaces.contains(name) && mesh.node_groups.contains(name);
-}
-
-/// The solid elements that have a face on the surface, as one part.
-Mesh solids_behind(const Mesh& mesh, const ContactSurface& master)
-{
-  const auto is_on = [&](int node) { return std::ranges::binary_search(master.nodes, node); };
-  Mesh behind;
-  behind.nodes = mesh.nodes;
-  for (Element element : mesh.elements)
-  {
-    const auto on_surface = [&](const std::array<int, 4>& face)
-    { return std::ranges::all_of(face, [&](int corner) { return corner < 0 || is_on(element.nodes[corner]); }); };
-    if (!std::ranges::any_of(corner_faces(element.shape), on_surface)) continue;
-    element.part = 0;
-    behind.elements.push_back(element);
-  }
-  return behind;
-}
-
-/// The motion of the solid at a place in one of its elements, or slightly outside: x is linear in the shape functions,
-/// so that rigid motions are exact.
-TiedNode on_solid(const Mesh& mesh, const Location& at, int node, int tie)
-{
-  const Element& element = mesh.elements[static_cast<std::size_t>(at.element)];
-  const ShapeFunctions N = shape_functions(element.shape, at.xi);
-  const Eigen::Matrix3d J = position_matrix(positions_of(mesh, element)) * N.dN.transpose();
-  const NodeGradients gradients = J.transpose().partialPivLu().solve(N.dN);
-  TiedNode result{node, tie, {}};
-  for (const int k : nodes_of(element))
-  {
-    const auto column = static_cast<Eigen::Index>(result.others.size());
-    result.others.push_back({k, N.N(column)});
-    result.gradients.push_back({gradients(0, column), gradients(1, column), gradients(2, column)});
-  }
-  return result;
-}
-
-void add_edge(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
-{
-  const ContactSurface master = contact_surface(mesh, tie.master, "tie");
-  if (master.placed.front().two_sided)
-    throw Error(name_of(tie) + "an edge follows solids, and '" + tie.master +
-                "' is a shell: let both share their nodes");
-  const Mesh behind = solids_behind(mesh, master);
-  const ElementLocator locator(behind, 0);
-  double chord = 0; // of curved faces, from their surface
-  for (const PlacedFace& face : master.placed) chord = std::max(chord, face.slack);
-  const double limit = std::max(tie.reach, coincident * master.size + chord);
-  for (const int node : mesh.node_groups.at(tie.slave))
-  {
-    const std::string place = node_text(node, mesh.nodes[node]);
-    const Location at = locator.find(mesh.nodes[node]);
-    if (at.element < 0) throw Error(name_of(tie) + place + " is far from the master: correct the names or the mesh");
-    if (std::ranges::count(nodes_of(behind.elements[static_cast<std::size_t>(at.element)]), node) > 0)
-      throw Error(name_of(tie) + place + " is the master's too, so that the parts are joined there: take the tie out");
-    if (const double away = distance_outside(behind, at); away > limit)
-      throw Error(name_of(tie) + place +
-                  format(" is %.4g m from the master: give the tie a reach above that, or correct the mesh", away));
-    result.nodes.push_back(on_solid(behind, at, node, index));
-  }
-  result.coverage.emplace_back();
-}
-
 void add_tie(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
 {
-  if (is_edge(mesh, tie.slave)) return add_edge(mesh, tie, index, result);
   ContactSurface slave = contact_surface(mesh, tie.slave, "tie"), master = contact_surface(mesh, tie.master, "tie");
   check_apart(tie, slave, master);
   if (!turn_shell(slave, master) && turn_shell(master, slave) && tie.reach > 0)

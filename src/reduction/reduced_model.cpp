@@ -38,7 +38,9 @@ MatrixXd normal_rows(const MatrixXd& of_pairs, int directions)
   return result;
 }
 
-/// Law, gaps, reactions and drive of the active pairs; normal ones alone if they slide along the drive throughout.
+/// Law, gaps, reactions and drive of the active pairs; normal ones alone if they slide along the drive throughout. What
+/// attachments left out of a pair's own compliance becomes one of the pair: more pairs may be closed than the shapes
+/// can tell apart.
 void set_active_pairs(ReducedModel& model, const Interface& interface, const Equilibrium& equilibrium, bool sliding)
 {
   const std::vector<double> motion = relative(interface, equilibrium.u);
@@ -49,7 +51,8 @@ void set_active_pairs(ReducedModel& model, const Interface& interface, const Equ
   for (const int pair : model.active)
   {
     const auto i = static_cast<std::size_t>(pair);
-    const double c = compliance_of(interface, i);
+    const auto own = static_cast<Index>(model.compliance.size());
+    const double c = compliance_of(interface, i) + (own < model.of_left_out.size() ? model.of_left_out(own) : 0);
     model.compliance.push_back(c);
     model.gap.push_back(equilibrium.closed[i] ? -c * reactions.normal(i) : interface.gap[i] + still.normal(i));
     model.reactions.push_back(reactions.normal(i));
@@ -125,16 +128,16 @@ Factor energy_factor(Mat K, Mat M, double omega, Mat Z, Mat P, const FactorOptio
   return factor;
 }
 
-/// The limits asked for, or those of the free memory.
+/// The attachments asked for, as many as half of the free memory holds.
 AttachmentLimits limits_of(const Reduction& reduction, const Structure& structure, Index modes)
 {
-  if (reduction.attachments > 0) return {reduction.threshold, reduction.attachments, 1};
   constexpr double most_lost = 0.1; // of compliance that no one chose to lose: 0.05 changes the cycle's energy by 4 %
   PetscInt dofs = 0;
   check(VecGetSize(structure.load, &dofs));
   const double room = memory_for_shapes(free_memory(comm_of(structure.load))) / memory_of_reduction(dofs, 1);
   const auto fitting = static_cast<Index>(std::min<double>(room, all_attachments));
-  return {reduction.threshold, std::max<Index>(0, fitting - modes), most_lost};
+  const bool all = reduction.attachments == all_attachments;
+  return {reduction.threshold, std::clamp<Index>(fitting - modes, 0, reduction.attachments), all ? most_lost : 1};
 }
 
 } // namespace
@@ -194,6 +197,7 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
     throw Error("reduced model: a shape has no mass or no stiffness: give massless points a mass, or set "
                 "fidelity = \"full\"");
   model.active = active;
+  model.sliding = roles.sliding;
   if (!reduction.sliding) model.of_left_out = normal_rows(model.of_left_out, interface.directions);
   set_active_pairs(model, interface, equilibrium, reduction.sliding);
   model.force = -model.H * VectorXd::Map(model.reactions.data(), model.H.cols());
@@ -238,6 +242,7 @@ ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibr
   const auto [basis, left] =
       set_matrices(result, point, model.shapes, rows_of(other.interface, model.active, RowsTaken::all));
   result.active = model.active;
+  result.of_left_out = model.of_left_out;
   set_active_pairs(result, other.interface, about.equilibrium, false);
   result.gap = model.gap;
   result.omega = model.omega;

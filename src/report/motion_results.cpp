@@ -246,17 +246,6 @@ void add_transient(Entry out, const Report& report)
     out.warn(Severity::warning, "the energy identity of the scheme is missed: tighten -transient_contact_tolerance");
 }
 
-void add_coarse(Entry out, const Report& report)
-{
-  const CoarseStart& coarse = report.coarse;
-  out.show("dofs", "-", "degrees of freedom of the coarser mesh", coarse.dofs);
-  out.show("pairs", "-", "its contact pairs", coarse.pairs);
-  out.add("residual", "-", "full-space residual of its cycle", coarse.outcome.residual);
-  out.show("frequency_hz", "Hz", "frequency of its cycle", 1 / coarse.period); // infinite, so null, without one
-  out.show("mean_fluctuating_energy", "J", "mean energy about equilibrium there", coarse.mean_fluctuating_energy);
-  out.show("periods", "-", "periods integrated on it", coarse.periods);
-}
-
 void add_cycle(Entry out, const Report& report)
 {
   const LimitCycle& cycle = report.motion.cycle;
@@ -340,7 +329,7 @@ void add_fidelity(Entry whole, const Fidelity& fidelity)
   reduced.show("size", "-", "shapes of the reduced model", fidelity.size);
   reduced.show("modes", "-", "shapes of modes among them", fidelity.modes);
   reduced.show("attachment_shapes", "-", "attachment shapes among them", fidelity.attachment_shapes);
-  out.add("left_out_shapes", "-", "attachment shapes that the free memory leaves out", fidelity.left_out_shapes);
+  out.add("left_out_shapes", "-", "attachment shapes that are left out", fidelity.left_out_shapes);
   out.add("lost_compliance", "-", "mean part of the active pairs' compliance in those", fidelity.lost_compliance);
   reduced.show("active_pairs", "-", "pairs with unilateral contact and friction in it", fidelity.active_pairs);
   reduced.show("sliding_pairs", "-", "pairs taken to stay closed and sliding; the rest stay open",

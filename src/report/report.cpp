@@ -47,14 +47,13 @@ const Estimate& followed_estimate(const Report& report)
   return report.point.estimates.empty() ? none : report.point.estimates.front();
 }
 
-std::array<std::pair<Stage, Outcome>, 13> outcomes_of(const Report& report)
+std::array<std::pair<Stage, Outcome>, 12> outcomes_of(const Report& report)
 {
   return {{{Stage::equilibrium, report.point.equilibrium.outcome},
            {Stage::modes, report.point.modes.outcome},
            {Stage::estimate, followed_estimate(report).outcome},
            {Stage::response, report.response.outcome},
            {Stage::transient, report.transient.outcome},
-           {Stage::coarse, report.coarse.outcome},
            {Stage::cycle, report.motion.cycle.outcome},
            {Stage::settled, report.motion.settled.outcome},
            {Stage::attractors, report.attractors.outcome},
@@ -107,7 +106,6 @@ void write_results(const Report& report, const Scene& scene, const Model& nodes,
                {
                  write_history(report, scene, output / word(ResultFile::history));
                  write_list(ResultFile::sweep, sweep_modes(report.sweep, scene, Content::results));
-                 write_list(ResultFile::sweep_motions, sweep_motions(report.sweep, scene));
                  write_list(ResultFile::robustness, robustness_samples(report.robustness, scene, Content::results));
                });
   write_fields(report, scene, nodes, output, comm);

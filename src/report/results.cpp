@@ -86,9 +86,9 @@ void add_tail(Entry out, const Report& report)
 }
 
 /// Results of each stage, in the order of outcomes_of.
-constexpr std::array add_found = {add_equilibrium, add_modes, add_estimate,  add_response,   add_transient,
-                                  add_coarse,      add_cycle, add_settled,   add_attractors, add_branch,
-                                  add_sensitivity, add_sweep, add_robustness};
+constexpr std::array add_found = {add_equilibrium, add_modes,       add_estimate, add_response,
+                                  add_transient,   add_cycle,       add_settled,  add_attractors,
+                                  add_branch,      add_sensitivity, add_sweep,    add_robustness};
 
 void add_stage(Entry out, const Report& report, std::size_t number)
 {
@@ -164,9 +164,8 @@ std::string result_page()
          "was `off` or `skipped` has an outcome and a reason only. Outcomes are explained in the "
          "[README](../README.md#outcomes-and-exit-codes).\n" +
          section("report.json", page_rows(results)) + section("sweep.csv", page_rows(modes)) +
-         section("robustness.csv", page_rows(samples)) +
-         "\n`sweep_motions.csv` has a line for each `sweep.points[].motion`, with its results.\n" +
-         section("history.h5", page_rows(history_sets)) + section("fields.h5", page_rows(field_sets));
+         section("robustness.csv", page_rows(samples)) + section("history.h5", page_rows(history_sets)) +
+         section("fields.h5", page_rows(field_sets));
 }
 
 } // namespace squeal

@@ -12,9 +12,6 @@ Result results_of(const Report& report, const Scene& scene);
 /// A group for each mode of each point of a sweep, one without a mode for a point that failed.
 Result sweep_modes(const Sweep& sweep, const Scene& scene, Content content);
 
-/// A group for each motion of a sweep.
-Result sweep_motions(const Sweep& sweep, const Scene& scene);
-
 /// A group for each random sample.
 Result robustness_samples(const Robustness& robustness, const Scene& scene, Content content);
 
@@ -33,7 +30,6 @@ void add_modes(Entry out, const Report& report);
 void add_estimate(Entry out, const Report& report);
 void add_response(Entry out, const Report& report);
 void add_transient(Entry out, const Report& report);
-void add_coarse(Entry out, const Report& report);
 void add_cycle(Entry out, const Report& report);
 void add_settled(Entry out, const Report& report);
 void add_attractors(Entry out, const Report& report);

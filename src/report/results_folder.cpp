@@ -112,7 +112,7 @@ void ResultsFolder::make()
   const fs::path partial = place_ / partial_folder, finished = place_ / finished_folder;
   made_ = fs::create_directories(place_);
   const bool is_of_a_run = fs::exists(place_ / lock_file) || fs::exists(place_ / word(ResultFile::options));
-  for (const char* folder : {partial_folder, finished_folder, word(ResultFile::reduced), word(ResultFile::checkpoints)})
+  for (const char* folder : {partial_folder, finished_folder, word(ResultFile::checkpoints)})
     if (fs::exists(place_ / folder) && !is_of_a_run)
       refuse_folder(place_ / folder, "runs write into a folder of this name, and no run has made this one");
   const std::string holder = lock();
@@ -194,12 +194,6 @@ void ResultsFolder::publish(Checkpoints checkpoints)
   published_ = true;
 }
 
-bool is_same_file(const fs::path& a, const fs::path& b)
-{
-  std::error_code none;
-  return fs::equivalent(a, b, none) || resolved(a) == resolved(b);
-}
-
 namespace
 {
 
@@ -229,36 +223,11 @@ std::vector<fs::path> inputs_of(const Scene& scene)
 {
   std::vector<fs::path> inputs = {scene.file};
   if (scene.mesh) append_mesh(scene.mesh->file, inputs);
-  if (scene.mesh && !scene.cycle.coarse_mesh.empty()) append_mesh(scene.cycle.coarse_mesh, inputs);
   if (scene.matrices) append_matrices(*scene.matrices, inputs);
   for (const Superelement& superelement : scene.superelements) append_matrices(superelement.folder, inputs);
   if (scene.transient.start.kind == StartKind::file) inputs.push_back(scene.transient.start.file);
   if (scene.cycle.start.kind == CycleStartKind::file) inputs.push_back(scene.cycle.start.file);
   return inputs;
-}
-
-void check_outputs(const Scene& scene, const std::vector<fs::path>& inputs, const fs::path& place)
-{
-  const std::string elsewhere = "name another folder with --output DIR";
-  std::vector<fs::path> taken = inputs;
-  const auto take = [&](const fs::path& output, const std::string& remedy)
-  {
-    for (const fs::path& other : taken)
-      if (is_same_file(output, other))
-        throw Error("the output " + output.string() + " would fall on " + other.string() + ", an input or another " +
-                    "output: " + remedy);
-    taken.push_back(output);
-  };
-  for (const char* name : words_of<ResultFile>)
-  {
-    const fs::path result = place / name;
-    if (result.has_extension() && is_folder(result))
-      throw Error("the output " + result.string() + " is a folder, which the result would replace: " + elsewhere);
-    take(result, elsewhere);
-  }
-  for (const auto& [key, file] : {std::pair("[transient] save_state", scene.transient.save_state),
-                                  std::pair("[cycle] save_state", scene.cycle.save_state)})
-    if (!file.empty()) take(file, std::string("give ") + key + " another name");
 }
 
 } // namespace squeal

@@ -24,28 +24,13 @@ void add_peak(Entry out, const std::string& excitation, const std::string& probe
   out.brief("receptance", "m/N", "displacement over force there", has_peak ? std::abs(*peak) : 0);
 }
 
-/// The full model's cycle beside a point of a reduced branch.
-void add_correction(Entry out, double parameter, const std::optional<BranchPoint>& orbit)
-{
-  out.show("parameter", "unit of the key", "where the full model's cycle was looked for", parameter);
-  out.show("converged", "switch", "it was found", orbit.has_value());
-  if (!out.has(orbit.has_value())) return;
-  const PointMeasures measures = orbit ? orbit->measures : PointMeasures{};
-  out.show("frequency_hz", "Hz", "its frequency", orbit ? 1 / orbit->period : 0);
-  out.show("mean_fluctuating_energy", "J", "its mean energy about equilibrium", measures.mean_fluctuating_energy);
-  out.show("residual", "-", "its full-space residual", orbit ? orbit->residual : 0);
-}
-
-void add_reduction(Entry out, const BranchReduction& reduction, const std::vector<BranchPoint>& points)
+void add_reduction(Entry out, const BranchReduction& reduction)
 {
   out.show("shapes", "-", "shapes of the reduced model", reduction.shapes);
   out.show("active_pairs", "-", "pairs that keep their contact in it", reduction.active_pairs);
   out.show("missed_pairs", "-", "further pairs that open or stick in the full model's periods", reduction.missed_pairs);
   out.show("interpolation_error", "-", "error of its matrices between the values sampled",
            reduction.interpolation_error);
-  const auto add = [&](Entry one, const CorrectedPoint& corrected)
-  { add_correction(one, one.is_example() ? 0 : points[corrected.place].parameter, corrected.orbit); };
-  out.list("corrections", add, reduction.corrections);
 }
 
 void add_branch_point(Entry out, const BranchPoint& point)
@@ -87,12 +72,6 @@ void add_equilibrium_point(Entry out, const EquilibriumStability& equilibrium)
   out.add("unstable_modes", "-", "unstable modes of the equilibrium", equilibrium.unstable_modes);
   out.add("growth_rate", "1/s", "growth rate of its least stable mode", equilibrium.growth_rate);
   out.add("frequency_hz", "Hz", "frequency of that mode", equilibrium.frequency_hz);
-}
-
-void add_range(Entry out, const ParameterRange& range)
-{
-  out.show("from", "unit of the key", "least value with a stable cycle beside a stable equilibrium", range.from);
-  out.show("to", "unit of the key", "greatest value; undecided points do not end the range", range.to);
 }
 
 /// An eigenvalue as growth rate and frequency.
@@ -227,13 +206,12 @@ void add_branch(Entry out, const Report& report)
   out.show("model", "model that the branch was followed on", found.reduction ? CycleModel::reduced : CycleModel::full);
   out.text("not_reduced", "why `auto` followed the full model after it had tried a reduced one", found.not_reduced);
   if (out.has(found.reduction.has_value()))
-    add_reduction(out.group("reduction"), found.reduction ? *found.reduction : none, branch.points);
+    add_reduction(out.group("reduction"), found.reduction ? *found.reduction : none);
   out.curve("points", add_branch_point, branch.points);
   out.list("events", add_event, branch.events);
   std::vector<EquilibriumStability> known = found.equilibria;
   std::erase_if(known, [](const EquilibriumStability& equilibrium) { return !equilibrium.known; });
   out.list("equilibria", add_equilibrium_point, known);
-  out.list("coexistence", add_range, found.coexistence);
 }
 
 void add_sensitivity(Entry out, const Report& report)

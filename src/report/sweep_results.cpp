@@ -60,25 +60,6 @@ void add_line_place(Entry out, const SweptPlace& place)
   out.add("direction", "-", "1: rotation as in the scene, -1: reversed", place.reversed ? -1 : 1);
 }
 
-void add_motion(Entry out, const SweptMotion& motion)
-{
-  out.add("outcome", "word", "outcome of the search; `settled`: the settled motion answers", word(motion.outcome.kind));
-  out.text("reason", "why it failed, or what is undecided", motion.outcome.reason);
-  out.add("kind", "kind of what attracts", motion.kind);
-  out.add("stability", "verdict on the cycle, if one was examined", motion.stability);
-  out.add("frequency_hz", "Hz", "of the cycle, or of the strongest line", motion.frequency_hz);
-  out.add("mean_fluctuating_energy", "J", "mean energy about equilibrium", motion.energy.value);
-  out.add("energy_error", "J", "of a settled motion: its error", motion.energy.error);
-  out.add("largest_multiplier", "-", "modulus of the cycle's", motion.multiplier);
-  out.add("multiplier_error", "-", "its error bar", motion.multiplier_error);
-  out.add("estimated_amplitude", "m", "amplitude by the energy estimate", motion.estimate);
-  out.add("residual", "-", "full-space residual of the cycle", motion.residual);
-  add_probes(out.hidden(), "peak_to_peak", "swing of the probe within a period", motion.peak_to_peak);
-  out.add("steps_per_period", "-", "time steps a period", motion.steps_per_period);
-  out.add("periods_integrated", "-", "periods that were integrated", motion.periods);
-  out.show("heard", "text", "what is heard, in a sentence", motion.heard);
-}
-
 void add_point(Entry out, const SweepPoint& point)
 {
   add_place(out, "value of each number", {point.values, point.reversed});
@@ -93,7 +74,6 @@ void add_point(Entry out, const SweepPoint& point)
     out.show("growth_rate", "1/s", "growth rate of the least stable mode", lambda.real());
     out.show("frequency_hz", "Hz", "frequency of that mode", frequency_hz_of(lambda));
   }
-  if (out.has(point.motion.has_value())) add_motion(out.group("motion"), point.motion.value_or(SweptMotion{}));
 }
 
 void add_track(Entry out, const Track& track)
@@ -177,27 +157,19 @@ void add_number(Entry out, const UncertainNumber& number, double correlation)
   out.show("rank_correlation", "-", "Spearman's, with the largest growth rate over abs(lambda)", correlation);
 }
 
-void add_check(Entry out, const RobustCheck& check)
-{
-  out.add("sample", "-", "number of a sample that was computed in full, from 0", check.sample);
-  out.add("known", "switch", "both models have modes", check.known);
-  out.add("unstable_modes", "-", "unstable modes of the full model", check.unstable);
-  out.add("unstable_modes_reduced", "-", "unstable modes of the reduced one", check.unstable_reduced);
-  out.add("growth_error", "-", "largest error of a growth rate over abs(lambda)", check.growth_error);
-  out.add("frequency_error", "-", "largest error of an angular frequency over abs(lambda)", check.frequency_error);
-}
-
-void add_random_sample(Entry out, const RobustSample& sample)
+void add_random_sample(Entry out, const SweepPoint& sample)
 {
   for (std::size_t i = 0; i < sample.values.size(); ++i)
     out.add(out.scene().uncertain[i].key, "unit of the key", "value of the random number", sample.values[i]);
   if (out.is_example()) out.add("<key>", "unit of the key", "value of each random number", 0);
-  out.add("known", "-", "1: there is an equilibrium", sample.known ? 1 : 0);
+  const SweptMode worst = sample.modes.empty() ? SweptMode{} : least_stable(sample);
+  out.add("known", "-", "1: there is an equilibrium", sample.outcome.kind == OutcomeKind::converged ? 1 : 0);
   out.add("closed_pairs", "-", "closed pairs", sample.closed);
   out.add("unstable_modes", "-", "unstable modes in the band", sample.unstable);
-  out.add("growth_rate", "1/s", "greatest growth rate over abs(lambda)", sample.growth_rate);
-  out.add("frequency_hz", "Hz", "frequency of that mode", sample.frequency_hz);
-  out.add("mode", "-", "its number in `robustness.modes[]` if it is unstable; -1: none", sample.mode);
+  out.add("growth_rate", "1/s", "greatest growth rate over abs(lambda)", worst.lambda.real());
+  out.add("frequency_hz", "Hz", "frequency of that mode", frequency_hz_of(worst.lambda));
+  out.add("mode", "-", "its number in `robustness.modes[]` if it is unstable; -1: none",
+          is_unstable(worst.lambda) ? worst.track : -1);
 }
 
 } // namespace
@@ -247,34 +219,17 @@ Result sweep_modes(const Sweep& sweep, const Scene& scene, Content content)
   return rows;
 }
 
-Result sweep_motions(const Sweep& sweep, const Scene& scene)
-{
-  Result rows{.kind = Result::Kind::list};
-  for (const SweepPoint& point : sweep.points)
-    if (point.motion)
-    {
-      const Entry row = Entry(rows, scene, Content::results).group("");
-      add_line_place(row, {point.values, point.reversed});
-      add_motion(row, *point.motion);
-    }
-  return rows;
-}
-
 void add_robustness(Entry out, const Report& report)
 {
   const Robustness& robustness = report.robustness;
-  const auto is_wrong = [](const RobustCheck& check)
-  { return check.known && check.unstable != check.unstable_reduced; };
   out.brief("samples", "-", "number of samples", robustness.samples.size());
   out.show("confidence", "-", "confidence of the intervals", out.scene().robustness->confidence);
   add_probability(out.group("any"), "samples with an unstable mode", robustness.any);
   out.show("basis_shapes", "-", "shapes of the basis", robustness.basis);
-  out.show("growth_error", "-", "error of growth rates over abs(lambda) in the checks", robustness.outcome.residual);
-  out.check(std::ranges::none_of(robustness.checks, is_wrong), "wrong_verdicts", "-",
-            "checks with another number of unstable modes", std::ranges::count_if(robustness.checks, is_wrong));
+  out.check(robustness.outcome.kind == OutcomeKind::converged, "residual", "-",
+            "largest backward error of right and left vectors in the full problem", robustness.outcome.residual);
   out.list("modes", add_random_mode, robustness.modes);
   out.list("numbers", add_number, out.scene().uncertain, robustness.correlation);
-  out.list("checks", add_check, robustness.checks);
 }
 
 Result robustness_samples(const Robustness& robustness, const Scene& scene, Content content)

@@ -313,7 +313,6 @@ private:
                                 : "every [[part]] has an alpha or beta of its own; take one of them out";
     const auto refuse = [&](const void* member, const char* key)
     { fail(member, "[damping] " + std::string(key) + " has no effect: " + why); };
-    if (!damping.measured.empty()) refuse(&damping.measured, "measured");
     if (damping.alpha != 0) refuse(&damping.alpha, "alpha");
     if (damping.beta != 0) refuse(&damping.beta, "beta");
   }
@@ -366,8 +365,7 @@ private:
   void check_cycle() const
   {
     const CycleSettings& c = scene_.cycle;
-    const bool sought = c.enabled || (scene_.sweep && scene_.sweep->stages == SweepStages::cycle);
-    if (c.start.kind == CycleStartKind::transient && sought && !scene_.transient.enabled)
+    if (c.start.kind == CycleStartKind::transient && c.enabled && !scene_.transient.enabled)
       fail(&c.start, "[cycle] start = 'transient' needs the [transient] that it starts from the end of");
     constexpr double of_rounding = 1e-14; // what the steps of a period leave of the fluctuation
     if (c.tolerance > 0 && c.tolerance < of_rounding)
@@ -381,26 +379,6 @@ private:
     if (!(scene_.accuracy < 1)) fail(&scene_.accuracy, "accuracy is a relative error: give less than 1, such as 1e-3");
     if (c.amplitude > 0 && c.start.kind != CycleStartKind::mode)
       fail(&c.amplitude, "[cycle] amplitude belongs to start = \"mode\": give that too, or leave it out");
-    check_coarse_start();
-  }
-
-  void check_coarse_start() const
-  {
-    const CycleSettings& c = scene_.cycle;
-    const bool named = !c.coarse_parameters.empty() || !c.coarse_mesh.empty();
-    if (c.start.kind != CycleStartKind::coarse)
-    {
-      const void* key = c.coarse_mesh.empty() ? static_cast<const void*>(&c.coarse_parameters) : &c.coarse_mesh;
-      if (named) fail(key, "[cycle] coarse_parameters and coarse_mesh belong to start = \"coarse\": give that too");
-      return;
-    }
-    if (!scene_.mesh)
-      fail(&c.start, "[cycle] start = \"coarse\" needs a [mesh], which this scene has not: start = \"estimate\" or a "
-                     "state file does without");
-    if (!named)
-      fail(&c.start,
-           "[cycle] start = \"coarse\" needs a coarser mesh: give coarse_parameters = { NAME = VALUE } of the "
-           "scene's .geo, or coarse_mesh = a file of the same parts and groups");
   }
 
   void check_response(const ResponseSettings& r) const

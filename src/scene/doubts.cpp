@@ -86,25 +86,12 @@ void doubt_cycle(const Scene& scene, std::vector<std::string>& doubts)
                      "and accuracy decides");
 }
 
-void doubt_damping(const RayleighDamping& damping, std::vector<std::string>& doubts)
-{
-  for (const auto& [frequency_hz, measured] : damping.measured)
-  {
-    constexpr double repeated = 1.5; // measured ratios of one brake differ by this much from one assembly to the next
-    const double used = damping_ratio_at(damping, frequency_hz);
-    if (std::max(used / measured, measured / used) > repeated)
-      doubts.push_back(format("the damping ratio measured at %g Hz is %.3g %%, and Rayleigh damping fitted to all of "
-                              "them has %.3g %% there",
-                              frequency_hz, 100 * measured, 100 * used));
-  }
-}
-
 /// Whether contacts may feed a structure of parts in which nothing takes energy.
 bool has_no_damping(const Scene& scene)
 {
   const auto damps = [](const RayleighDamping& damping) { return damping.alpha > 0 || damping.beta > 0; };
   return !scene.parts.empty() && !scene.contacts.empty() && scene.superelements.empty() && !damps(scene.damping) &&
-         scene.damping.measured.empty() && scene.damping.loss_frequency == 0 &&
+         scene.damping.loss_frequency == 0 &&
          std::ranges::none_of(scene.parts, [&](const Part& part) { return part.damping && damps(*part.damping); }) &&
          std::ranges::none_of(scene.springs, [](const Spring& spring) { return spring.damping > 0; }) &&
          std::ranges::all_of(scene.connectors, [](const Connector& joint) { return joint.damping.empty(); });
@@ -137,7 +124,6 @@ std::vector<std::string> doubts_about(const Scene& scene, double length, double 
     doubts.push_back("nothing damps the structure: modes that friction couples grow at any friction; give [damping]");
   if (length > 0) doubt_contacts(scene, length, doubts);
   doubt_cycle(scene, doubts);
-  doubt_damping(scene.damping, doubts);
   return doubts;
 }
 

@@ -101,19 +101,16 @@ public:
     if (!sweep_.table.empty()) read_design();
     if (sweep_.key.empty()) fail(&sweep_, "needs the key 'key', the number that changes, or 'table', a file of points");
     if (!sweep_.table.empty()) return;
-    const std::size_t numbers = sweep_.key.size();
-    if (numbers > 2) fail(&sweep_.key, "names " + std::to_string(numbers) + " numbers: give one or two");
-    if (numbers == 2 && sweep_.key[0] == sweep_.key[1])
-      fail(&sweep_.key, "names \"" + sweep_.key[0] + "\" twice: give two different numbers");
-    for (const std::string& key : sweep_.key)
-      prefixed(places_.at(&sweep_.key) + ": ", [&] { (void)number_at(scene_, key, "[sweep]"); });
+    if (sweep_.key.size() > 1)
+      fail(&sweep_.key, "names " + std::to_string(sweep_.key.size()) + " numbers: give one, or a table of points");
+    const std::string& key = sweep_.key.front();
+    prefixed(places_.at(&sweep_.key) + ": ", [&] { (void)number_at(scene_, key, "[sweep]"); });
     check_form();
-    for (std::size_t i = 0; i < numbers; ++i)
-      for (const auto* list : {&sweep_.from, &sweep_.to})
-        if (!list->empty())
-          need_scene(scene_, {sweep_.key[i], (*list)[i]}, places_.at(list), "[sweep] this end is no scene: ");
+    if (sweep_.values.empty())
+      for (const double* end : {&sweep_.from, &sweep_.to})
+        need_scene(scene_, {key, *end}, places_.at(end), "[sweep] this end is no scene: ");
     for (const double value : sweep_.values)
-      need_scene(scene_, {sweep_.key[0], value}, places_.at(&sweep_.values), "[sweep] one of the values is no scene: ");
+      need_scene(scene_, {key, value}, places_.at(&sweep_.values), "[sweep] one of the values is no scene: ");
   }
 
 private:
@@ -122,20 +119,11 @@ private:
     throw Error(places_.at(member) + ": [sweep] " + text);
   }
 
-  template <class List> void need_length(const List& list, const char* name) const
-  {
-    if (list.size() != sweep_.key.size())
-      fail(places_.given.count(&list) ? static_cast<const void*>(&list) : &sweep_.key,
-           list.empty() ? std::string(name) + " is missing: give one a key"
-                        : std::string(name) + " holds " + std::to_string(list.size()) + " numbers for " +
-                              std::to_string(sweep_.key.size()) + " keys: give one a key");
-  }
-
   /// The points of the file, whose numbers are of the scene; what makes no scene fails as a point.
   void read_design()
   {
-    if (!sweep_.from.empty() || !sweep_.to.empty() || !sweep_.values.empty() || sweep_.samples > 0)
-      fail(&sweep_.table, "table holds all values: take from, to, values and samples out");
+    if (sweep_.from != sweep_.to || !sweep_.values.empty())
+      fail(&sweep_.table, "table holds all values: take from, to and values out");
     const DesignTable table = read_design_table(sweep_.table);
     if (!sweep_.key.empty() && sweep_.key != table.keys) fail(&sweep_.key, "table holds the keys: take key out");
     sweep_.key = table.keys;
@@ -144,31 +132,24 @@ private:
       prefixed(sweep_.table.string() + ": ", [&] { (void)number_at(scene_, key, "[sweep] table:"); });
   }
 
-  /// A list of values, a grid, or samples of a range.
+  /// A list of values, or a grid.
   void check_form()
   {
     if (!sweep_.values.empty())
     {
-      if (sweep_.key.size() > 1) fail(&sweep_.values, "values belong to a single key: give from, to and points");
-      if (!sweep_.from.empty() || !sweep_.to.empty() || sweep_.samples > 0 || places_.given.count(&sweep_.points))
-        fail(&sweep_.values, "values exclude from, to, points and samples: keep one form");
+      if (sweep_.from != sweep_.to || sweep_.points != SweepSettings{}.points)
+        fail(&sweep_.values, "values exclude from, to and points: keep one form");
       std::vector<double> sorted = sweep_.values;
       std::ranges::sort(sorted);
       if (const auto twice = std::ranges::adjacent_find(sorted); twice != sorted.end())
         fail(&sweep_.values, "values holds " + text_of_number(*twice) + " twice: take one of them out");
       return;
     }
-    need_length(sweep_.from, "from");
-    need_length(sweep_.to, "to");
-    for (std::size_t i = 0; i < sweep_.from.size(); ++i)
-      if (sweep_.from[i] == sweep_.to[i])
-        fail(&sweep_.to, "from and to are both " + text_of_number(sweep_.to[i]) + ": give a range, or values");
-    if (sweep_.samples > 0 && places_.given.count(&sweep_.points))
-      fail(&sweep_.samples, "samples and points exclude each other: keep one");
-    if (sweep_.points.size() == 1) sweep_.points.resize(sweep_.key.size(), sweep_.points.front());
-    need_length(sweep_.points, "points");
-    for (const int points : sweep_.points)
-      if (points < 2) fail(&sweep_.points, "points = " + std::to_string(points) + ": a grid has at least two");
+    if (sweep_.from == sweep_.to)
+      fail(places_.given.contains(&sweep_.to) ? static_cast<const void*>(&sweep_.to) : &sweep_.key,
+           "from and to are both " + text_of_number(sweep_.to) + ": give a range, or values");
+    if (sweep_.points < 2)
+      fail(&sweep_.points, "points = " + std::to_string(sweep_.points) + ": a grid has at least two");
   }
 
   SweepSettings& sweep_;

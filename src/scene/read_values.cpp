@@ -132,18 +132,6 @@ public:
     }
   }
 
-  void read(const toml::node& node, std::vector<MeasuredRatio>& target) const
-  {
-    target.clear();
-    for (const auto& [frequency, ratio] :
-         rows_of_two(node, "at least two rows [frequency in Hz, damping ratio] such as [[800, 0.004], [2500, 0.006]]"))
-    {
-      if (!(frequency > 0 && ratio > 0 && ratio < 1)) fail(node, "frequencies above 0 and ratios between 0 and 1");
-      target.push_back({frequency, ratio});
-    }
-    if (target.size() < 2) fail(node, "at least two rows [frequency in Hz, damping ratio]");
-  }
-
   void read(const toml::node& node, std::array<double, 6>& target) const
   {
     const auto values = numbers(node, "a list of three or six numbers");

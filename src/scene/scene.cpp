@@ -1,8 +1,4 @@
 /// From a scene file and overrides to a checked Scene.
-///
-/// Rayleigh damping is fitted to measured damping ratios (src/README.md, section 13.3) by least squares of the relative
-/// errors, zeta(omega_i)/zeta_i - 1, with alpha >= 0 and beta >= 0.
-#include "squeal/base/constants.hpp"
 #include "squeal/base/error.hpp"
 #include "toml_values.hpp"
 
@@ -31,40 +27,6 @@ toml::table parse_file(const std::filesystem::path& file)
   }
 }
 
-/// Sum of the squared relative errors.
-double misfit(const RayleighDamping& damping)
-{
-  double sum = 0;
-  for (const auto& [frequency_hz, ratio] : damping.measured)
-    sum += std::pow(damping_ratio_at(damping, frequency_hz) / ratio - 1, 2);
-  return sum;
-}
-
-/// The fit of two unknowns is that of both, or of one of them where the other would be negative.
-void fit(RayleighDamping& damping)
-{
-  double aa = 0, ab = 0, bb = 0, a = 0, b = 0; // normal equations of both unknowns
-  for (const auto& [frequency_hz, ratio] : damping.measured)
-  {
-    const double omega = two_pi * frequency_hz, by_alpha = 1 / (2 * omega * ratio), by_beta = omega / (2 * ratio);
-    aa += by_alpha * by_alpha;
-    ab += by_alpha * by_beta;
-    bb += by_beta * by_beta;
-    a += by_alpha;
-    b += by_beta;
-  }
-  const double determinant = aa * bb - ab * ab;
-  damping.alpha = (bb * a - ab * b) / determinant;
-  damping.beta = (aa * b - ab * a) / determinant;
-  if (damping.alpha >= 0 && damping.beta >= 0) return;
-  RayleighDamping other = damping;
-  damping.alpha = a / aa;
-  damping.beta = 0;
-  other.alpha = 0;
-  other.beta = b / bb;
-  if (misfit(other) < misfit(damping)) damping = other;
-}
-
 /// Reads a number that is not negative and moves `at` behind it; returns false if there is none.
 bool read_number(const char*& at, const char* end, long& value)
 {
@@ -75,25 +37,6 @@ bool read_number(const char*& at, const char* end, long& value)
 }
 
 } // namespace
-
-double damping_ratio_at(const RayleighDamping& damping, double frequency_hz)
-{
-  const double omega = two_pi * frequency_hz;
-  return damping.alpha / (2 * omega) + damping.beta * omega / 2;
-}
-
-void fit_damping(Scene& scene, const Places& places)
-{
-  RayleighDamping& damping = scene.damping;
-  if (damping.measured.empty()) return;
-  const RayleighDamping given = damping;
-  fit(damping);
-  for (const auto& [key, member] : {std::pair{"alpha", &RayleighDamping::alpha}, {"beta", &RayleighDamping::beta}})
-    if (given.*member != 0 && given.*member != damping.*member) // a resolved scene holds what was fitted
-      throw Error(places.at(&damping.measured) + ": [damping] " + key +
-                  format(" = %g excludes 'measured', from which it follows as %.17g: keep one of them", given.*member,
-                         damping.*member));
-}
 
 std::optional<RowNames> row_names(const std::string& text)
 {
@@ -213,7 +156,6 @@ Scene read_scene(const std::filesystem::path& file, const std::vector<std::strin
   read_tables(root, scene, places);
   check_scene(scene, places);
   if (scene.rotors.empty()) resolve_friction(scene); // else the mesh tells which contacts they drive
-  fit_damping(scene, places);
   resolve_branch(scene, places);
   resolve_sweep(scene, places);
   check_sensitivity(scene, places);

@@ -284,9 +284,7 @@ SceneKeys keys_of(InitialMotion& m)
 SceneKeys keys_of(Tie& t)
 {
   return {
-      {"slave", &t.slave, "text",
-       "named surface whose nodes follow: the finer or softer side, and the smaller one; or a named curve, the edge of "
-       "a shell",
+      {"slave", &t.slave, "text", "named surface whose nodes follow: the finer or softer side, and the smaller one",
        required},
       {"master", &t.master, "text", "named surface that they follow", required},
       {"reach", &t.reach, "m",
@@ -329,10 +327,6 @@ SceneKeys keys_of(RayleighDamping& d)
        "where loss factors have their viscous equivalent eta/omega K in time steps and in the estimate; modes take "
        "complex stiffness",
        not_negative, damping},
-      {"measured", &d.measured, "table",
-       "instead of alpha and beta, which are fitted to damping ratios measured on modes: [[frequency in Hz, ratio], "
-       "...], at least two, frequencies rising",
-       positive},
   };
 }
 
@@ -353,8 +347,7 @@ SceneKeys keys_of(Scene& scene)
       {"fidelity", choice_of(scene.fidelity), "word",
        "model on which the cycle is sought; auto: what the scene leaves open is chosen as the accuracy needs it"},
       {"accuracy", &scene.accuracy, "-",
-       "relative error that fidelity = \"auto\" may leave in the cycle's frequency and mean fluctuating energy; "
-       "in growth rates of [robustness] over what they scatter by",
+       "relative error that fidelity = \"auto\" may leave in the cycle's frequency and mean fluctuating energy",
        positive},
       {"gravity", &scene.gravity, "m/s2", "acceleration of gravity; no load factor scales it", load},
       {"numbers", &scene.numbers, "table",
@@ -386,7 +379,8 @@ SceneKeys keys_of(Scene& scene)
       section("transient", scene.transient, "time integration; runs when the table is present"),
       section("cycle", scene.cycle, "limit cycle by shooting; runs when the table is present"),
       section("branch", scene.branch, "the limit cycle along a number of the scene; runs when the table is present"),
-      section("sweep", scene.sweep, "stability at many values of one or two numbers; runs when the table is present"),
+      section("sweep", scene.sweep,
+              "stability at many values of a number, or at design points; runs when the table is present"),
       section("sensitivity", scene.sensitivity,
               "derivatives, energies and powers of the unstable modes; runs when the table is present"),
       section("change", scene.changes, "a mass, damper or spring proposed at a probe, predicted and computed"),

@@ -48,11 +48,10 @@ struct TableTarget
 };
 
 /// The member that a key fills.
-using Target =
-    std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*, std::optional<Vec3>*,
-                 std::vector<Vec3>*, std::vector<std::string>*, std::vector<double>*, std::vector<int>*,
-                 std::array<double, 6>*, Motions*, std::map<std::string, double>*, FactorTable*, DampingTarget,
-                 FrictionTarget, FrictionTableTarget, StartTarget, std::vector<MeasuredRatio>*, Choice, TableTarget>;
+using Target = std::variant<double*, int*, long*, bool*, std::string*, std::filesystem::path*, Vec3*,
+                            std::optional<Vec3>*, std::vector<Vec3>*, std::vector<std::string>*, std::vector<double>*,
+                            std::array<double, 6>*, Motions*, std::map<std::string, double>*, FactorTable*,
+                            DampingTarget, FrictionTarget, FrictionTableTarget, StartTarget, Choice, TableTarget>;
 
 /// Whether a key must be given.
 enum class Need
@@ -192,9 +191,6 @@ void resolve_sweep(Scene& scene, const Places& places);
 
 /// Throws Error where a number of the sensitivity is none of the scene, or a change is at no probe or changes nothing.
 void check_sensitivity(const Scene& scene, const Places& places);
-
-/// Fits the scene's Rayleigh damping to the measured ratios, where there are some. Throws Error where it is given too.
-void fit_damping(Scene& scene, const Places& places);
 
 /// Gives every random number its mean. Throws Error if there is no such number, or its values make no scene.
 void resolve_robustness(Scene& scene, const Places& places);

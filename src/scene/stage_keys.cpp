@@ -22,9 +22,6 @@ SceneKeys keys_of(ModesSettings& m)
       {"real_modes", &m.real_modes, "-", "number of real modes of the projection; 0: those of the band", not_negative},
       {"residual_passes", &m.residual_passes, "-", "corrections of the projection by the residual", not_negative},
       {"band", &m.band, "Hz", "every mode below is reported", positive},
-      {"reduced_matrices", &m.reduced_matrices, "switch",
-       "writes the brake, reduced to the modes found and to the attachment shapes of all pairs, as a matrix scene into "
-       "reduced/"},
   };
 }
 
@@ -65,14 +62,9 @@ SceneKeys keys_of(CycleSettings& c)
       {"enabled", &c.enabled, "switch", "run this stage; true when the table is there"},
       {"start", StartTarget{choice_of(c.start.kind), &c.start.file}, "word",
        "where the search starts: the unstable modes at their estimates (estimate), the followed mode at an amplitude "
-       "(mode), the end of the run's own transient (transient), the cycle on a coarser mesh (coarse), or a state file"},
+       "(mode), the end of the run's own transient (transient), or a state file"},
       {"amplitude", &c.amplitude, "m", "largest displacement at start = \"mode\"; 0: twice first lift-off",
        not_negative},
-      {"coarse_parameters", &c.coarse_parameters, "table",
-       "with start = \"coarse\": values for the DefineConstant of the scene's .geo that make its mesh coarser"},
-      {"coarse_mesh", &c.coarse_mesh, "path",
-       "or a mesh or geometry of its own, with the same parts, surfaces and groups; coarse_parameters are then its own",
-       file},
       {"steps_per_period", &c.steps_per_period, "-", "time steps a period; 0: chosen", not_negative},
       {"tolerance", &c.tolerance, "-", "largest residual in the full space that counts as a cycle; 0: chosen",
        not_negative},
@@ -96,32 +88,23 @@ SceneKeys keys_of(BranchSettings& b)
       {"from", &b.from, "-", "its value at one end of the branch, in its own unit", required},
       {"to", &b.to, "-", "its value at the other end; the scene's own value is between them", required},
       {"points", &b.points, "-", "number of points if this number alone changed along the branch", positive},
-      {"corrections", &b.corrections, "-",
-       "number of points, evenly spread, where the full model's cycle is found beside a reduced model's; none where "
-       "the full model is followed",
-       not_negative},
   };
 }
 
 SceneKeys keys_of(SweepSettings& s)
 {
   return {
-      {"key", &s.key, "texts",
-       "number of the structure, its contact or its loads, as --set names it, or a list of two"},
-      {"from", &s.from, "-",
-       "its first value, in its own unit; a list of two for two numbers, here and in the next lines"},
+      {"key", &s.key, "texts", "number of the structure, its contact or its loads, as --set names it"},
+      {"from", &s.from, "-", "its first value, in its own unit"},
       {"to", &s.to, "-", "its last value"},
       {"points", &s.points, "-", "number of values from the first to the last", positive},
-      {"values", &s.values, "-", "list of values of a single number, instead of the grid"},
+      {"values", &s.values, "-", "list of values, instead of the grid"},
       {"table", &s.table, "path",
-       "CSV file of points instead of all these: a head of keys, such as numbers.clamp, and a line of values a point",
+       "CSV file of points instead of all these: a head of keys, such as numbers.clamp, and a line of values a point. "
+       "Modes are named by the first one's",
        file},
-      {"samples", &s.samples, "-",
-       "number of random points of the ranges, evenly distributed, instead of the grid; 0: none", not_negative},
-      {"seed", &s.seed, "-", "seed of the random points", not_negative},
       {"directions", choice_of(s.directions), "word", "one direction of rotation, that of the scene, or both"},
-      {"stages", choice_of(s.stages), "word",
-       "at each point the equilibrium alone, or the modes too, or also the cycle where modes grow"},
+      {"stages", choice_of(s.stages), "word", "at each point the equilibrium alone, or the modes too"},
   };
 }
 
@@ -158,8 +141,6 @@ SceneKeys keys_of(RobustnessSettings& r)
 {
   return {
       {"samples", &r.samples, "-", "number of random scenes", positive},
-      {"checks", &r.checks, "-", "number of them, the first ones, that are computed by the full problem as well",
-       not_negative},
       {"seed", &r.seed, "-", "seed of the random numbers", not_negative},
       {"confidence", &r.confidence, "-", "confidence of the intervals of the probabilities", fraction},
   };

@@ -73,9 +73,6 @@ void resolve_robustness(Scene& scene, const Places& places)
     throw Error(places.at(&settings) + ": [robustness] has no random number: give [[uncertain]] tables");
   if (settings.confidence <= 0 || settings.confidence >= 1)
     throw Error(places.at(&settings.confidence) + ": [robustness] confidence must be between 0 and 1, such as 0.95");
-  if (!places.given.contains(&settings.checks)) settings.checks = std::min(settings.checks, settings.samples);
-  if (settings.checks > settings.samples)
-    throw Error(places.at(&settings.checks) + ": [robustness] checks are some of the samples: give at most as many");
   std::set<std::string> keys;
   for (UncertainNumber& number : scene.uncertain) try
     {

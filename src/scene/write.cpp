@@ -67,23 +67,12 @@ private:
     return print(text.empty() ? no_motions : text);
   }
 
-  std::string print(const MeasuredRatio& measured) const
-  {
-    const std::string frequency = print(measured.frequency_hz), ratio = print(measured.ratio);
-    return "[" + frequency + ", " + ratio + "]";
-  }
-
   /// A vector, or a list of any values.
   template <std::ranges::range List> std::string print(const List& list) const
   {
     std::string text;
     for (const auto& entry : list) text += (text.empty() ? "" : ", ") + print(entry);
     return "[" + text + "]";
-  }
-
-  std::string print(const std::vector<int>& list) const
-  {
-    return list.size() == 1 ? print(list.front()) : print<>(list);
   }
 
   std::string print(const FactorTable& factor) const

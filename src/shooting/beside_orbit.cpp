@@ -99,6 +99,14 @@ SeenGrowth growth_of(const BesideMotion& motion, std::vector<double> distances, 
 
 } // namespace
 
+bool is_left_open_by_largest(const Multipliers& multipliers)
+{
+  if (multipliers.stability != Stability::undecided || !multipliers.complete) return false;
+  for (std::size_t i = 1; i < multipliers.values.size(); ++i)
+    if (multipliers.values[i] != std::conj(multipliers.values[0]) && !(multipliers.upper_bound(i) < 1)) return false;
+  return true;
+}
+
 Owned<Vec> state_beside(const OrbitProblem& problem, const Orbit& orbit, Vec fastest, double part)
 {
   const Owned<Vec> fluctuation = fluctuation_of(problem, orbit);
@@ -162,9 +170,7 @@ void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipli
                                       nearest.growth);
     return;
   }
-  if (multipliers.stability != Stability::undecided || !multipliers.complete) return;
-  for (std::size_t i = 1; i < multipliers.values.size(); ++i)
-    if (multipliers.values[i] != std::conj(multipliers.values[0]) && !(multipliers.upper_bound(i) < 1)) return;
+  if (!is_left_open_by_largest(multipliers)) return;
   const double of_grid = moved_by_grid(multipliers, multipliers.values.front());
   if (of_grid > std::abs(nearest.growth - 1))
     multipliers.would_decide = format(

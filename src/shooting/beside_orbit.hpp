@@ -27,6 +27,9 @@ std::vector<double> distances_beside(const OrbitProblem& problem, ConvergenceLog
 std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
                                        const FloquetAnalysis& floquet, long periods);
 
+/// Whether the bar of the largest multiplier, or of its conjugate, alone leaves the verdict open. Not collective.
+bool is_left_open_by_largest(const Multipliers& multipliers);
+
 /// Decides what only the bar of the largest multiplier leaves undecided, where a motion along it was seen to grow or to
 /// decay beyond its own bar. "Stable" is undecided where one was seen to grow.
 void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers);

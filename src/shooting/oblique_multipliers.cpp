@@ -321,7 +321,7 @@ Deflation beside_known(const Monodromy& monodromy, const SlowMotions& slow, cons
 
 Completeness coverage_of(const SlowMotions& slow, const DeflatedSearch& search)
 {
-  if (!slow.confirmed())
+  if (!slow.confirmed)
     return {false, "the reduced model has another number of large multipliers with fewer modes: more of them "
                    "(modes.band) would decide"};
   if (search.bounded) return {true, ""};

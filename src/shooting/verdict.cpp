@@ -56,16 +56,17 @@ void hold_against_motion(const OrbitProblem& problem, const ShootingOptions& opt
              largest, 100 * part, 100 * distances.back(), distances.size());
 }
 
-/// The number of periods over which motions beside the orbit are watched: as many as are asked for, else where only
-/// the bar of the largest multiplier, of a whole matrix, leaves the verdict open.
-long watched_periods(const ShootingOptions& options, const Verdict& verdict)
+/// The number of periods over which motions beside the orbit are watched: as many as are asked for. Else where only the
+/// bar of the largest multiplier leaves the verdict open, as many as are affordable or as the search took.
+long watched_periods(const Flow& flow, const ShootingOptions& options, const ConvergenceLog& log,
+                     const Verdict& verdict)
 {
-  constexpr long enough = 200; // a growth of 1e-3 a period shows
+  constexpr double enough = 200; // a growth of 1e-3 a period shows
   const Multipliers& multipliers = verdict.floquet.multipliers;
-  const bool open = multipliers.stability == Stability::undecided && multipliers.complete &&
-                    multipliers.method == MultiplierMethod::whole && largest_reaches_across(multipliers);
   if (options.watched_periods >= 0) return options.watched_periods;
-  return open && verdict.beside == Beside::not_seen ? enough : 0;
+  if (verdict.beside != Beside::not_seen || !is_left_open_by_largest(multipliers)) return 0;
+  const auto searched = static_cast<double>(log.convergence.periods);
+  return static_cast<long>(std::min(enough, std::max(affordable_work / flow.work, searched)));
 }
 
 } // namespace
@@ -82,7 +83,7 @@ Verdict judge(const OrbitProblem& problem, const ShootingOptions& options, Conve
     multipliers.offsets = orbit.offsets.held;
     sought = "a motion beside it was watched";
     hold_against_motion(problem, options, log, orbit, verdict);
-    const long periods = watched_periods(options, verdict);
+    const long periods = watched_periods(problem.flow, options, log, verdict);
     if (periods > 0) multipliers.seen = growths_beside(problem, log, orbit, verdict.floquet, periods);
     decide_by_growth(multipliers.seen, multipliers);
   }

@@ -10,7 +10,6 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
-#include <limits>
 
 namespace squeal
 {
@@ -204,21 +203,6 @@ void append_vector(const std::vector<double>& entries, std::string& bytes)
   append_big_endian(static_cast<Index>(VEC_FILE_CLASSID), bytes);
   append_big_endian(static_cast<Index>(entries.size()), bytes);
   for (const double entry : entries) append_big_endian(entry, bytes);
-}
-
-void append_matrix(const Eigen::MatrixXd& entries, std::string& bytes)
-{
-  const auto rows = static_cast<Index>(entries.rows()), columns = static_cast<Index>(entries.cols());
-  if (entries.size() > std::numeric_limits<Index>::max())
-    throw Error(
-        format("a matrix of %lld entries is beyond the indices of its file", static_cast<long long>(entries.size())));
-  for (const Index number : {static_cast<Index>(MAT_FILE_CLASSID), rows, columns, static_cast<Index>(rows * columns)})
-    append_big_endian(number, bytes);
-  for (Index i = 0; i < rows; ++i) append_big_endian(columns, bytes);
-  for (Index i = 0; i < rows; ++i)
-    for (Index j = 0; j < columns; ++j) append_big_endian(j, bytes);
-  for (Index i = 0; i < rows; ++i)
-    for (Index j = 0; j < columns; ++j) append_big_endian(entries(i, j), bytes);
 }
 
 } // namespace squeal

@@ -122,15 +122,15 @@ void check_free(const Mesh& mesh, const Scene& scene, const Bolt& bolt, const st
     for (const std::string& name : {tie.slave, tie.master}) look(name, "tie");
 }
 
-std::vector<Cut> cuts_of_section(const Bolt& bolt, const MeshPiece& piece, const Scene& scene)
+std::vector<Cut> cuts_of_section(const Bolt& bolt, const NumberedMesh& numbered, const Scene& scene)
 {
-  const std::vector<int> section = named_nodes(piece.mesh, bolt.section, "bolt " + bolt.name);
-  check_free(piece.mesh, scene, bolt, section);
+  const std::vector<int> section = named_nodes(numbered.mesh, bolt.section, "bolt " + bolt.name);
+  check_free(numbered.mesh, scene, bolt, section);
   std::vector<Cut> cuts;
-  for (const auto& [element, side] : sides_of(piece.mesh, bolt, section))
+  for (const auto& [element, side] : sides_of(numbered.mesh, bolt, section))
   {
     if (side < 0) continue;
-    Cut cut{element_contribution(piece, scene, static_cast<std::size_t>(element)), {}};
+    Cut cut{element_contribution(numbered, scene, static_cast<std::size_t>(element)), {}};
     cut.shift.setZero(static_cast<Eigen::Index>(cut.of.nodal_dofs.size()));
     for (Eigen::Index k = 0; k < cut.shift.size(); ++k)
       if (const PetscInt nodal_dof = cut.of.nodal_dofs[static_cast<std::size_t>(k)];
@@ -143,12 +143,12 @@ std::vector<Cut> cuts_of_section(const Bolt& bolt, const MeshPiece& piece, const
 
 } // namespace
 
-std::vector<Cut> cuts_of(const Bolt& bolt, const MeshPiece& piece, const Scene& scene)
+std::vector<Cut> cuts_of(const Bolt& bolt, const NumberedMesh& numbered, const Scene& scene)
 {
-  if (bolt.beam.empty()) return cuts_of_section(bolt, piece, scene);
+  if (bolt.beam.empty()) return cuts_of_section(bolt, numbered, scene);
   const auto beam = std::ranges::find(scene.beams, bolt.beam, &Beam::name);
   const auto index = static_cast<std::size_t>(beam - scene.beams.begin());
-  const Mesh& mesh = piece.mesh;
+  const Mesh& mesh = numbered.mesh;
   const std::vector<int>& nodes = mesh.beams[index];
   const Vec3 span = mesh.nodes[static_cast<std::size_t>(nodes[1])] - mesh.nodes[static_cast<std::size_t>(nodes[0])];
   std::vector<Contribution> own = beam_contributions(mesh, scene, index);

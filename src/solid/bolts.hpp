@@ -16,6 +16,6 @@ struct Cut
 /// The part of a bolt that its section cuts. A section of nodes cuts the elements on the side that the axis points to:
 /// they see its nodes moved against the axis. The mesh must be whole. Throws Error for a section that does not cut
 /// through a shank, and for nodes in a contact or tie.
-std::vector<Cut> cuts_of(const Bolt& bolt, const MeshPiece& piece, const Scene& scene);
+std::vector<Cut> cuts_of(const Bolt& bolt, const NumberedMesh& numbered, const Scene& scene);
 
 } // namespace squeal

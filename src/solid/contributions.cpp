@@ -160,11 +160,11 @@ double loss_omega(const Scene& scene)
   return two_pi * scene.damping.loss_frequency;
 }
 
-Contribution element_contribution(const MeshPiece& piece, const Scene& scene, std::size_t index)
+Contribution element_contribution(const NumberedMesh& numbered, const Scene& scene, std::size_t index)
 {
-  const Element& element = piece.mesh.elements[index];
+  const Element& element = numbered.mesh.elements[index];
   const Part& part = scene.parts[element.part];
-  const std::vector<Vec3> x = positions_of(piece.mesh, element);
+  const std::vector<Vec3> x = positions_of(numbered.mesh, element);
   try
   {
     return damped(nodal_dofs_of(element), element_matrices(element.shape, x, material_at(part, x), part.thickness),
@@ -172,11 +172,8 @@ Contribution element_contribution(const MeshPiece& piece, const Scene& scene, st
   }
   catch (const std::runtime_error& error)
   {
-    const bool whole = piece.element_numbers.empty();
-    const int number = whole ? static_cast<int>(index) : piece.element_numbers[index], node = element.nodes[0];
-    throw Error("part " + part.name + ", element " + std::to_string(number) + " with " +
-                node_text(whole ? node : piece.node_numbers[static_cast<std::size_t>(node)], x[0]) + ": " +
-                error.what());
+    throw Error("part " + part.name + ", element " + std::to_string(index) + " with " +
+                node_text(element.nodes[0], x[0]) + ": " + error.what());
   }
 }
 

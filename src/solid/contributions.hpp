@@ -20,7 +20,7 @@ double loss_omega(const Scene& scene);
 
 /// Returns the contribution of an element. Throws std::runtime_error with its part and place if its Jacobian is not
 /// positive.
-Contribution element_contribution(const MeshPiece& piece, const Scene& scene, std::size_t index);
+Contribution element_contribution(const NumberedMesh& numbered, const Scene& scene, std::size_t index);
 
 /// Contributions of points, bodies, couplings, added masses, springs, connectors, superelements and beams. The mesh
 /// must be whole.

@@ -1,8 +1,7 @@
 /// Free degrees of freedom q and the constraints u = T q on the nodal degrees of freedom u.
 ///
 /// Rigid body:       u = u_ref + theta x (x - x_ref); the rotations of a shell node are theta.
-/// Tie:              a slave node follows nodes of the master, a shell's edge with its rotations
-///                   (squeal/mesh/ties.hpp).
+/// Tie:              a slave node follows nodes of the master (squeal/mesh/ties.hpp).
 /// Coupling, joint, support in a frame: rows of their own (constraints.hpp).
 /// Shell on a solid: a node of both rotates with the solid nodes around it, those of the solid elements that hold it,
 /// by
@@ -13,7 +12,6 @@
 #include "squeal/solid/dofs.hpp"
 
 #include "constraints.hpp"
-#include "squeal/base/broadcast.hpp"
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/mesh/ties.hpp"
 #include "squeal/solid/element.hpp"
@@ -119,16 +117,6 @@ void add_supports(Constraints& constraints, const Mesh& mesh, const Scene& scene
     if (is_plain(support)) hold(constraints, mesh, support);
 }
 
-/// The rotation of a tied node, about `axis`, by the curl of the others' motion.
-std::vector<ConstraintTerm> rotation_terms(const TiedNode& tied, int axis)
-{
-  std::vector<ConstraintTerm> terms;
-  for (std::size_t k = 0; k < tied.others.size(); ++k)
-    for (int c = 0; c < 3; ++c)
-      terms.push_back({6 * PetscInt{tied.others[k].node} + c, cross(tied.gradients[k], unit(c))[axis] / 2});
-  return terms;
-}
-
 /// Whether each node is on a solid.
 std::vector<char> nodes_on_solids(const Mesh& mesh)
 {
@@ -163,9 +151,6 @@ void add_ties(Constraints& constraints, const Mesh& mesh, const Scene& scene)
           terms.push_back({first + 3 + axis, cross(unit(axis), tied.arm)[c]});
       make_dependent(constraints, first + c, std::move(terms));
     }
-    for (int axis = 0; axis < 3; ++axis)
-      if (!tied.gradients.empty() && constraints.kind_of(tied.node, 3 + axis) == DofKind::free)
-        make_dependent(constraints, first + 3 + axis, rotation_terms(tied, axis));
   }
 }
 
@@ -318,13 +303,6 @@ std::string describe(const DofNames& names, PetscInt dof)
   const int node = static_cast<int>(nodal_dof / 6);
   return names.bodies[names.body[node]] + ", " + node_text(node, names.at[node]) + ", direction " +
          motion_words[nodal_dof % 6];
-}
-
-std::string describe(const DofNames& names, PetscInt dof, MPI_Comm comm)
-{
-  std::string text = rank_of(comm) == 0 ? describe(names, dof) : std::string();
-  broadcast(text, comm);
-  return text;
 }
 
 std::span<const DofTerm> DofMap::terms_of(PetscInt nodal_dof) const

@@ -68,10 +68,10 @@ std::set<int> coordinate_nodes(const Mesh& mesh)
 }
 
 /// Adds T' M a of everything that has mass: elements on their ranks, the rest on rank 0. Collective.
-void add_gravity(Vec load, const MeshPiece& piece, const Scene& scene, const std::vector<Contribution>& lumped)
+void add_gravity(Vec load, const NumberedMesh& numbered, const Scene& scene, const std::vector<Contribution>& lumped)
 {
   const MPI_Comm comm = comm_of(load);
-  const std::set<int> coordinates = coordinate_nodes(piece.mesh);
+  const std::set<int> coordinates = coordinate_nodes(numbered.mesh);
   const auto add = [&](const Contribution& contribution)
   {
     Eigen::VectorXd a = Eigen::VectorXd::Zero(contribution.M.rows());
@@ -81,12 +81,12 @@ void add_gravity(Vec load, const MeshPiece& piece, const Scene& scene, const std
       const bool falls = nodal_dof % 6 < 3 && !coordinates.contains(static_cast<int>(nodal_dof / 6));
       if (falls) a(k) = scene.gravity[static_cast<std::size_t>(nodal_dof % 6)];
     }
-    add_vector(load, local_dofs(piece.dofs, contribution.nodal_dofs), contribution.M * a);
+    add_vector(load, local_dofs(numbered.dofs, contribution.nodal_dofs), contribution.M * a);
   };
   const auto add_own = [&]
   {
-    for (std::size_t i = 0; i < piece.mesh.elements.size(); ++i)
-      if (piece.partition.element_rank[i] == rank_of(comm)) add(element_contribution(piece, scene, i));
+    for (std::size_t i = 0; i < numbered.mesh.elements.size(); ++i)
+      if (numbered.partition.element_rank[i] == rank_of(comm)) add(element_contribution(numbered, scene, i));
     for (const Contribution& contribution : lumped) add(contribution);
   };
   on_every_rank(comm, add_own);
@@ -100,26 +100,26 @@ Eigen::VectorXd shift_of(const DofMap& dofs, const std::vector<PetscInt>& nodal_
 }
 
 /// Adds -T' K s of what supports move. On rank 0.
-void add_prescribed(Vec load, const MeshPiece& piece, const Scene& scene, const std::vector<Contribution>& lumped)
+void add_prescribed(Vec load, const NumberedMesh& numbered, const Scene& scene, const std::vector<Contribution>& lumped)
 {
-  const DofMap& dofs = piece.dofs;
+  const DofMap& dofs = numbered.dofs;
   if (dofs.shift.empty()) return;
   const auto add = [&](const Contribution& of)
   { add_vector(load, local_dofs(dofs, of.nodal_dofs), -of.K * shift_of(dofs, of.nodal_dofs)); };
-  for (std::size_t i = 0; i < piece.mesh.elements.size(); ++i)
+  for (std::size_t i = 0; i < numbered.mesh.elements.size(); ++i)
   {
-    const Element& element = piece.mesh.elements[i];
+    const Element& element = numbered.mesh.elements[i];
     if (shift_of(dofs, nodal_dofs_of(element)).isZero(0)) continue;
     const Part& part = scene.parts[static_cast<std::size_t>(element.part)];
     if (part.rotation)
       throw Error("part " + part.name + " spins, so no support can move its nodes: let the support hold them");
-    add(element_contribution(piece, scene, i));
+    add(element_contribution(numbered, scene, i));
   }
   for (const Contribution& contribution : lumped) add(contribution);
 }
 
 /// The section of a bolt. Collective.
-TightBolt bolt_of(const Bolt& bolt, const MeshPiece& piece, const Scene& scene, Vec layout)
+TightBolt bolt_of(const Bolt& bolt, const NumberedMesh& numbered, const Scene& scene, Vec layout)
 {
   TightBolt result;
   result.name = bolt.name;
@@ -128,12 +128,12 @@ TightBolt bolt_of(const Bolt& bolt, const MeshPiece& piece, const Scene& scene, 
   const MPI_Comm comm = comm_of(layout);
   const auto add_cuts = [&]
   {
-    for (const auto& [of, shift] : cuts_of(bolt, piece, scene))
+    for (const auto& [of, shift] : cuts_of(bolt, numbered, scene))
     {
       const Eigen::VectorXd force = of.K * shift;
-      add_vector(result.pull, local_dofs(piece.dofs, of.nodal_dofs), -force);
+      add_vector(result.pull, local_dofs(numbered.dofs, of.nodal_dofs), -force);
       result.stiffness += shift.dot(force);
-      result.own += force.dot(shift_of(piece.dofs, of.nodal_dofs));
+      result.own += force.dot(shift_of(numbered.dofs, of.nodal_dofs));
     }
   };
   on_rank_zero(comm, add_cuts);
@@ -171,19 +171,19 @@ Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const DofMap& dof
   return load;
 }
 
-void assemble_preload(Structure& structure, const MeshPiece& piece, const Scene& scene, MPI_Comm comm)
+void assemble_preload(Structure& structure, const NumberedMesh& numbered, const Scene& scene, MPI_Comm comm)
 {
   structure.preload = {};
   structure.bolts.clear();
   if (!has_preload(scene)) return;
   structure.preload = zeros_like(structure.load);
-  std::vector<Contribution> lumped; // on rank 0
-  on_rank_zero(comm, [&] { lumped = lumped_contributions(piece.mesh, scene); });
-  if (scene.gravity != Vec3{}) add_gravity(structure.preload, piece, scene, lumped);
-  on_rank_zero(comm, [&] { add_prescribed(structure.preload, piece, scene, lumped); });
+  std::vector<Contribution> lumped; // on rank 0, which adds them
+  on_rank_zero(comm, [&] { lumped = lumped_contributions(numbered.mesh, scene); });
+  if (scene.gravity != Vec3{}) add_gravity(structure.preload, numbered, scene, lumped);
+  on_rank_zero(comm, [&] { add_prescribed(structure.preload, numbered, scene, lumped); });
   end_assembly(structure.preload);
   check(VecAXPY(structure.load, 1, structure.preload));
-  for (const Bolt& bolt : scene.bolts) structure.bolts.push_back(bolt_of(bolt, piece, scene, structure.load));
+  for (const Bolt& bolt : scene.bolts) structure.bolts.push_back(bolt_of(bolt, numbered, scene, structure.load));
 }
 
 double tension_of(const TightBolt& bolt, Vec u)

@@ -1,7 +1,5 @@
 #include "squeal/solid/sparse_rows.hpp"
 
-#include "squeal/base/packed.hpp"
-
 #include <algorithm>
 #include <cmath>
 
@@ -12,30 +10,6 @@ void add_displacement(const DofMap& dofs, int node, const Vec3& direction, Spars
 {
   for (int c = 0; c < 3; ++c)
     for (const DofTerm& term : dofs.terms_of(6 * PetscInt{node} + c)) row[term.dof] += direction[c] * term.factor;
-}
-
-std::vector<SparseRow> scattered_rows(std::vector<SparseRow> rows, PetscInt count, MPI_Comm comm)
-{
-  const std::size_t of_item = count > 0 ? rows.size() / static_cast<std::size_t>(count) : 0;
-  const auto rows_of = [&](int rank)
-  {
-    const auto [first, last] = range_of(count, rank, ranks_of(comm));
-    return std::span(rows).subspan(static_cast<std::size_t>(first) * of_item,
-                                   static_cast<std::size_t>(last - first) * of_item);
-  };
-  if (rank_of(comm) == 0)
-  {
-    for (int to = 1; to < ranks_of(comm); ++to)
-    {
-      const std::span<const SparseRow> others = rows_of(to);
-      send(packed(std::vector<SparseRow>(others.begin(), others.end())), to, comm);
-    }
-    rows.resize(rows_of(0).size());
-    return rows;
-  }
-  std::string received;
-  receive(received, 0, comm);
-  return unpacked<std::vector<SparseRow>>(received);
 }
 
 Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_columns, MPI_Comm comm)
@@ -106,7 +80,7 @@ std::vector<int> probed_nodes(const std::vector<Probe>& probes, const Mesh& mesh
 
 Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const DofMap& dofs, MPI_Comm comm)
 {
-  std::vector<SparseRow> rows; // all of them, on rank 0
+  std::vector<SparseRow> rows;
   const auto add_all = [&]
   {
     for (const Probe& probe : probes)
@@ -118,9 +92,9 @@ Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const 
                     " in its direction is held, so it would read 0");
     }
   };
-  on_rank_zero(comm, add_all);
-  return matrix_of_rows(scattered_rows(std::move(rows), static_cast<PetscInt>(probes.size()), comm),
-                        dofs.last - dofs.first, comm);
+  on_every_rank(comm, add_all);
+  const auto [first, last] = local_range(static_cast<PetscInt>(probes.size()), comm);
+  return matrix_of_rows({rows.begin() + first, rows.begin() + last}, dofs.last - dofs.first, comm);
 }
 
 } // namespace squeal

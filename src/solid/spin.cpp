@@ -126,16 +126,16 @@ struct Spinning
   LocalDofs local;
 };
 
-std::vector<Spinning> spinning_elements(const MeshPiece& piece, const Scene& scene, int rank)
+std::vector<Spinning> spinning_elements(const NumberedMesh& numbered, const Scene& scene, int rank)
 {
-  const Mesh& mesh = piece.mesh;
+  const Mesh& mesh = numbered.mesh;
   std::vector<Spinning> result;
   for (std::size_t i = 0; i < mesh.elements.size(); ++i)
   {
     const Element& element = mesh.elements[i];
     const Part& part = scene.parts[static_cast<std::size_t>(element.part)];
-    if (!spins(part) || piece.partition.element_rank[i] != rank) continue;
-    result.push_back({element, part, positions_of(mesh, element), local_dofs(piece.dofs, nodal_dofs_of(element))});
+    if (!spins(part) || numbered.partition.element_rank[i] != rank) continue;
+    result.push_back({element, part, positions_of(mesh, element), local_dofs(numbered.dofs, nodal_dofs_of(element))});
   }
   return result;
 }
@@ -197,17 +197,17 @@ void finish(Mat A)
 
 } // namespace
 
-void add_spin(Structure& structure, const MeshPiece& piece, const Scene& scene)
+void add_spin(Structure& structure, const NumberedMesh& numbered, const Scene& scene)
 {
   if (std::ranges::none_of(scene.parts, spins)) return;
   const MPI_Comm comm = comm_of(structure.K);
   const auto check_all = [&]
   {
     for (std::size_t i = 0; i < scene.parts.size(); ++i)
-      if (spins(scene.parts[i])) check_revolution(piece.mesh, scene.parts[i], static_cast<int>(i));
+      if (spins(scene.parts[i])) check_revolution(numbered.mesh, scene.parts[i], static_cast<int>(i));
   };
   on_rank_zero(comm, check_all);
-  const std::vector<Spinning> elements = spinning_elements(piece, scene, rank_of(comm));
+  const std::vector<Spinning> elements = spinning_elements(numbered, scene, rank_of(comm));
 
   Owned<Mat> centrifugal;
   Owned<Vec> force;

@@ -6,8 +6,8 @@ namespace squeal
 {
 
 /// Adds G, and to K the centrifugal part with the stiffness of the centrifugal stress. M, C and K are assembled.
-/// Collective; a piece of rank 0 is the whole mesh. Throws Error for a part that spins and is no solid of revolution
+/// Collective. Throws Error for a part that spins and is no solid of revolution
 /// about its axis.
-void add_spin(Structure& structure, const MeshPiece& piece, const Scene& scene);
+void add_spin(Structure& structure, const NumberedMesh& numbered, const Scene& scene);
 
 } // namespace squeal

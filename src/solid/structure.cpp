@@ -1,7 +1,7 @@
 /// M, C, K and the load on the free degrees of freedom: sums of T_e' A_e T_e over contributions, u_e = T_e q.
 ///
-/// A contribution is that of an element, or lumped: a mass, spring, connector, beam or superelement. A rank
-/// has all elements that share a degree of freedom with it, so that it counts the entries of its own rows exactly.
+/// A contribution is that of an element, or lumped: a mass, spring, connector, beam or superelement. Every rank has the
+/// mesh, so that it counts the entries of its own rows exactly.
 /// Contributions to rows of other ranks are sent at the end of the assembly. All three matrices receive every
 /// contribution, zeros included, which gives them one pattern.
 #include "squeal/solid/structure.hpp"
@@ -9,7 +9,6 @@
 #include "contributions.hpp"
 #include "local_dofs.hpp"
 #include "spin.hpp"
-#include "squeal/base/packed.hpp"
 
 #include <algorithm>
 
@@ -56,18 +55,8 @@ RowCounts count_entries(const DofMap& dofs, const std::vector<std::vector<PetscI
   return counts;
 }
 
-/// The free degrees of freedom of each of rank 0's contributions, on every rank.
-std::vector<std::vector<PetscInt>> free_dofs_of(const DofMap& dofs, const std::vector<Contribution>& lumped,
-                                                MPI_Comm comm)
-{
-  std::vector<std::vector<PetscInt>> result;
-  for (const Contribution& contribution : lumped) result.push_back(free_dofs(dofs, contribution.nodal_dofs));
-  broadcast_packed(result, comm);
-  return result;
-}
-
-/// Counts the entries that elements and lumped contributions, by their free degrees of freedom, give this rank's rows.
-RowCounts count_entries(const Mesh& mesh, const DofMap& dofs, std::vector<std::vector<PetscInt>> lumped)
+/// Counts the entries that elements and lumped contributions give this rank's rows.
+RowCounts count_entries(const Mesh& mesh, const DofMap& dofs, const std::vector<Contribution>& lumped)
 {
   std::vector<std::vector<PetscInt>> cliques; // those with a row of this rank
   const auto add = [&](std::vector<PetscInt> free)
@@ -76,7 +65,7 @@ RowCounts count_entries(const Mesh& mesh, const DofMap& dofs, std::vector<std::v
     if (own != free.end() && *own < dofs.last) cliques.push_back(std::move(free));
   };
   for (const Element& element : mesh.elements) add(free_dofs(dofs, nodal_dofs_of(element)));
-  for (std::vector<PetscInt>& free : lumped) add(std::move(free));
+  for (const Contribution& contribution : lumped) add(free_dofs(dofs, contribution.nodal_dofs));
   return count_entries(dofs, cliques);
 }
 
@@ -93,18 +82,17 @@ Owned<Mat> empty_matrix(const DofMap& dofs, const RowCounts& counts, MPI_Comm co
 
 } // namespace
 
-Structure assemble(const MeshPiece& piece, const Scene& scene, MPI_Comm comm)
+Structure assemble(const NumberedMesh& numbered, const Scene& scene, MPI_Comm comm)
 {
-  const Mesh& mesh = piece.mesh;
-  const DofMap& dofs = piece.dofs;
+  const Mesh& mesh = numbered.mesh;
+  const DofMap& dofs = numbered.dofs;
   Structure structure;
-  const std::int64_t own = std::ranges::count(piece.partition.element_rank, rank_of(comm));
-  MPI_Allreduce(&own, &structure.elements, 1, MPI_INT64_T, MPI_SUM, comm);
+  structure.elements = static_cast<std::int64_t>(mesh.elements.size());
   structure.names = dofs.names;
-  std::vector<Contribution> lumped; // on rank 0
-  on_rank_zero(comm, [&] { lumped = lumped_contributions(mesh, scene); });
+  std::vector<Contribution> lumped;
+  on_every_rank(comm, [&] { lumped = lumped_contributions(mesh, scene); });
   {
-    const auto counts = count_entries(mesh, dofs, free_dofs_of(dofs, lumped, comm));
+    const auto counts = count_entries(mesh, dofs, lumped);
     for (Owned<Mat>* A : {&structure.M, &structure.C, &structure.K}) *A = empty_matrix(dofs, counts, comm);
     structure.loss_omega = loss_omega(scene);
     if (structure.loss_omega > 0) structure.K_loss = empty_matrix(dofs, counts, comm);
@@ -112,11 +100,12 @@ Structure assemble(const MeshPiece& piece, const Scene& scene, MPI_Comm comm)
   const auto add_own_elements = [&]
   {
     for (std::size_t i = 0; i < mesh.elements.size(); ++i)
-      if (piece.partition.element_rank[i] == rank_of(comm))
-        add_contribution(structure, dofs, element_contribution(piece, scene, i));
+      if (numbered.partition.element_rank[i] == rank_of(comm))
+        add_contribution(structure, dofs, element_contribution(numbered, scene, i));
   };
   on_every_rank(comm, add_own_elements);
-  for (const Contribution& contribution : lumped) add_contribution(structure, dofs, contribution);
+  for (const Contribution& contribution : lumped)
+    if (rank_of(comm) == 0) add_contribution(structure, dofs, contribution);
   for (Mat A : {structure.M.get(), structure.C.get(), structure.K.get(), structure.K_loss.get()})
   {
     if (!A) continue;
@@ -124,9 +113,9 @@ Structure assemble(const MeshPiece& piece, const Scene& scene, MPI_Comm comm)
     check(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
     mark_symmetric(A);
   }
-  add_spin(structure, piece, scene);
+  add_spin(structure, numbered, scene);
   structure.load = assemble_load(mesh, scene, dofs, comm);
-  assemble_preload(structure, piece, scene, comm);
+  assemble_preload(structure, numbered, scene, comm);
   return structure;
 }
 

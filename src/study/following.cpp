@@ -246,6 +246,48 @@ std::vector<Match> follow(const ModeForms& forms, double clear)
   return matches;
 }
 
+namespace
+{
+
+/// Of two modes locked in at one frequency, of which one grows: that one, whichever it is of the two.
+std::size_t unstable_partner(const std::vector<TwoSidedPair>& modes, std::size_t mode)
+{
+  const Complex own = modes[mode].lambda;
+  if (is_unstable(own)) return mode;
+  const auto locked =
+      std::ranges::find_if(modes,
+                           [own](const TwoSidedPair& other)
+                           {
+                             const Complex apart = other.lambda - own;
+                             return is_unstable(other.lambda) && std::abs(apart.imag()) < std::abs(apart.real());
+                           });
+  return locked == modes.end() ? mode : static_cast<std::size_t>(locked - modes.begin());
+}
+
+} // namespace
+
+std::vector<int> names_by_shapes(const PointModes& reference, const PointModes& point)
+{
+  constexpr double least_share = 0.1; // of a mode of the reference, below which it is none of them
+  std::vector<int> names(point.pairs.size(), -1);
+  if (reference.pairs.empty() || names.empty()) return names;
+  const MatrixXd macs = all_macs(forms_between(reference, point));
+  for (std::size_t j = 0; j < names.size(); ++j)
+  {
+    double most = least_share;
+    for (std::size_t i = 0; i < reference.pairs.size(); ++i)
+    {
+      // to be one mode, its stiffness over its mass would have to have changed by so much
+      const double change = folded(std::norm(reference.pairs[i].lambda) / std::norm(point.pairs[j].lambda)),
+                   alike = macs(static_cast<Index>(i), static_cast<Index>(j)) * change;
+      if (alike <= most) continue;
+      most = alike;
+      names[j] = static_cast<int>(unstable_partner(reference.pairs, i));
+    }
+  }
+  return names;
+}
+
 std::vector<int> nearest_partners(const std::vector<Complex>& from, const std::vector<Complex>& to)
 {
   const bool all = from.size() <= to.size(); // the shorter list has partners

@@ -52,6 +52,10 @@ ModeForms forms_between(const PointModes& from, const PointModes& to);
 std::vector<int> nearest_partners(const std::vector<std::complex<double>>& from,
                                   const std::vector<std::complex<double>>& to);
 
+/// For each mode of a point the place of the mode of a reference that it shares most with, and whose frequency is not
+/// far from its own; -1: it is like none. Not collective.
+std::vector<int> names_by_shapes(const PointModes& reference, const PointModes& point);
+
 /// Modes in the structure's degrees of freedom, as `expanded` gives them.
 struct ExpandedModes
 {

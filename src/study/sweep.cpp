@@ -1,17 +1,75 @@
 #include "squeal/study/sweep.hpp"
 
+#include "following.hpp"
 #include "squeal/base/run_control.hpp"
 #include "sweep_groups.hpp"
-#include "sweep_motions.hpp"
 #include "sweeper.hpp"
 
 #include <algorithm>
+#include <map>
 
 namespace squeal
 {
 
 namespace
 {
+
+using TrackNames = std::map<int, int>; // of a line, to those of the whole
+
+/// The names of a point's tracks by those of the same point elsewhere, matched by their eigenvalues.
+TrackNames names_by(const SweepPoint& here, const SweepPoint& there)
+{
+  std::vector<std::complex<double>> own, known;
+  for (const SweptMode& mode : here.modes) own.push_back(mode.lambda);
+  for (const SweptMode& mode : there.modes) known.push_back(mode.lambda);
+  TrackNames names;
+  const std::vector<int> partners = nearest_partners(own, known);
+  for (std::size_t i = 0; i < partners.size(); ++i)
+    if (partners[i] >= 0) names[here.modes[i].track] = there.modes[static_cast<std::size_t>(partners[i])].track;
+  return names;
+}
+
+/// Adds what was found along a line. Its tracks get the names that its first modes have elsewhere: at the same point of
+/// another group, or at the start in the other direction of rotation, where friction is weak; else new ones.
+void add(Sweep& whole, const Sweep& part, const SweepLine& line)
+{
+  auto first = part.points.begin();
+  TrackNames names;
+  if (first != part.points.end() && !whole.points.empty())
+  {
+    const auto is_shared = [&](const SweepPoint& point)
+    { return point.values == first->values && point.reversed == first->reversed; };
+    const auto shared = std::ranges::find_if(whole.points, is_shared);
+    if (!line.continued)
+      names = names_by(*first, whole.points.front());
+    else if (shared != whole.points.end()) // it lacks where a group was asked to end
+      names = names_by(*first++, *shared);
+  }
+  const auto rename = [&](int& track)
+  {
+    if (track < 0) return;
+    const auto [name, is_new] = names.try_emplace(track, whole.tracks);
+    whole.tracks += is_new;
+    track = name->second;
+  };
+  for (SweepPoint point : std::vector(first, part.points.end()))
+  {
+    for (SweptMode& mode : point.modes) rename(mode.track);
+    whole.points.push_back(std::move(point));
+  }
+  for (Threshold threshold : part.thresholds)
+  {
+    rename(threshold.track);
+    whole.thresholds.push_back(std::move(threshold));
+  }
+  whole.lost += part.lost;
+  whole.cut_short += part.cut_short;
+  whole.least_mac = std::min(whole.least_mac, part.least_mac);
+  whole.least_mac_across = std::min(whole.least_mac_across, part.least_mac_across);
+  whole.outcome.residual = std::max(whole.outcome.residual, part.outcome.residual);
+  whole.basis = std::max(whole.basis, part.basis);
+  whole.passes += part.passes;
+}
 
 /// Where a point is, for messages.
 std::string place_of(const SweepPoint& point, const std::vector<std::string>& keys)
@@ -28,59 +86,46 @@ void assess(Sweep& sweep, const std::vector<std::string>& keys, std::size_t tota
   Outcome& outcome = sweep.outcome;
   outcome.iterations = static_cast<int>(sweep.points.size());
   const bool complete = outcome.kind != OutcomeKind::interrupted;
-  const auto motions =
-      std::ranges::count_if(sweep.points, [](const SweepPoint& point) { return point.motion.has_value(); });
   if (!complete)
     outcome.reason = format("the run was ended %s after %td of %zu points", who_asked_to_end().c_str(),
-                            std::ranges::count(sweep.points, false, &SweepPoint::inserted), total) +
-                     (motions > 0 ? format(" and %td motions", motions) : "");
-  const auto note = [&](const auto& outcome_of, const std::string& what, bool fails)
+                            std::ranges::count(sweep.points, false, &SweepPoint::inserted), total);
+  const auto note = [&](bool inserted, const std::string& what)
   {
     int failed = 0;
     std::string first;
     for (const SweepPoint& point : sweep.points)
-      if (const Outcome* at = outcome_of(point); at && !succeeded(*at) && ++failed == 1)
-        first = place_of(point, keys) + ": " + at->reason;
+      if (point.inserted == inserted && !succeeded(point.outcome) && ++failed == 1)
+        first = place_of(point, keys) + ": " + point.outcome.reason;
     if (failed == 0) return;
-    if (complete && fails) outcome.kind = OutcomeKind::not_converged;
+    if (complete && !inserted) outcome.kind = OutcomeKind::not_converged; // modes are followed without those put in
     outcome.reason +=
         (outcome.reason.empty() ? "" : "; ") + format("%d %s failed, the first at ", failed, what.c_str()) + first;
   };
-  const auto at_point = [](bool inserted)
-  { return [=](const SweepPoint& point) { return point.inserted == inserted ? &point.outcome : nullptr; }; };
-  note(at_point(false), format("of %zu points", total), true);
-  note([](const SweepPoint& point) { return point.motion ? &point.motion->outcome : nullptr; },
-       format("of %td motions", motions), true);
-  const auto inserted = std::ranges::count(sweep.points, true, &SweepPoint::inserted);
-  note(at_point(true), format("of %td points put in between", inserted), false); // modes are followed without it
-}
-
-/// Each group's share of the points, visited at the same time. What a group throws ends all of them after their work.
-Sweep run_in_groups(const SweepProblem& problem, const std::vector<SweepLine>& lines, int groups, MPI_Comm comm)
-{
-  const RankGroup group(comm, groups);
-  std::vector<std::vector<SweepLine>> shares;
-  for (int g = 0; g < groups; ++g) shares.push_back(share_of(lines, g, groups));
-  Sweep own;
-  const auto visit_share = [&]
-  { own = visit(problem, group.comm(), shares[static_cast<std::size_t>(group.number())]); };
-  if (!work_in_parts(group, comm, visit_share)) own.outcome.kind = OutcomeKind::interrupted;
-  Sweep whole = joined(shared(own, group, groups, comm), shares);
-  whole.outcome.kind = own.outcome.kind; // the same on all ranks
-  return whole;
+  note(false, format("of %zu points", total));
+  note(true, format("of %td points put in between", std::ranges::count(sweep.points, true, &SweepPoint::inserted)));
 }
 
 } // namespace
 
 Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm)
 {
-  constexpr std::size_t fewest = 4; // points of a group: two that another one visits as well cost half as much again
   const std::vector<SweepLine> lines = lines_of(problem.settings);
   const std::size_t total = points_of(lines);
-  const int groups = groups_of(problem.options.groups, {total, fewest}, comm);
-  const auto linear = [&]
-  { return groups > 1 ? run_in_groups(problem, lines, groups, comm) : visit(problem, comm, lines); };
-  Sweep sweep = problem.settings.stages == SweepStages::cycle ? with_motions(linear, problem, comm) : linear();
+  const int groups = groups_of(problem.options.groups, total, comm);
+  VisitedLines visited;
+  if (groups > 1)
+    visited = visit_in_groups(problem, lines, groups, comm);
+  else
+    visited = {lines, visit(problem, comm, lines)};
+  Sweep sweep;
+  sweep.groups = groups;
+  sweep.outcome.kind = OutcomeKind::converged;
+  for (std::size_t i = 0; i < visited.found.size(); ++i)
+  {
+    add(sweep, visited.found[i], visited.lines[i]);
+    if (visited.ended || visited.found[i].outcome.kind == OutcomeKind::interrupted)
+      sweep.outcome.kind = OutcomeKind::interrupted;
+  }
   assess(sweep, problem.settings.key, total);
   return sweep;
 }

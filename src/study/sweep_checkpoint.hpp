@@ -1,5 +1,5 @@
 #pragma once
-/// The points of a sweep and the motions at them as lists of numbers, for other groups of ranks and for a restart.
+/// The points of a sweep as a list of numbers, for other groups of ranks.
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/checkpoint.hpp"
 #include "squeal/study/sweep.hpp"
@@ -7,10 +7,8 @@
 namespace squeal
 {
 
-/// The points, without their motions, and the thresholds.
+/// The points and the thresholds.
 void describe(Checkpoint& checkpoint, Sweep& sweep);
-
-void describe(Checkpoint& checkpoint, SweptMotion& motion);
 
 /// Copies a value of one rank to every rank. Collective.
 template <class Value> Value of_rank(int rank, Value value, MPI_Comm comm)

@@ -9,10 +9,10 @@
 #include "thresholds.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <deque>
-#include <ranges>
+#include <numeric>
+#include <utility>
 
 namespace squeal
 {
@@ -24,6 +24,7 @@ namespace
 /// those of 33 224 degrees of freedom within 7e-8.
 constexpr double large_tolerance = 1e-6;
 constexpr double threshold_tolerance = 1e-5; // of the number's larger end
+constexpr std::size_t prepared = 16;         // design points whose closed pairs tell those of the basis
 constexpr int most_halvings = 6;             // of a step
 constexpr PetscInt most_between = 100;       // points put into a step where modes are unclear or pairs open or close
 constexpr int many_changes = 2; // of contact in a step: beyond, a half may need fewer; two bodies alike change at once
@@ -32,46 +33,51 @@ class Sweeper
 {
 public:
   Sweeper(const SweepProblem& problem, MPI_Comm comm)
-      : problem_(problem), comm_(comm),
-        model_({problem.model_at, problem.modes, problem.modes_options, problem.equilibrium_options}, comm,
-               [comm] { end_if_asked(comm); })
+      : problem_(problem), comm_(comm), model_(problem, comm, [comm] { end_if_asked(comm); })
   {
-    sweep_.outcome.kind = OutcomeKind::converged;
   }
 
   /// Visits these lines. Where the run is asked to end, the points done stay.
-  Sweep run(const std::vector<SweepLine>& lines)
+  std::vector<Sweep> run(const std::vector<SweepLine>& lines)
   {
+    std::vector<Sweep> found;
     try
     {
-      visit_all(lines);
+      prepare(lines);
+      for (const SweepLine& line : lines)
+      {
+        run_line(line);
+        sweep_.outcome.kind = OutcomeKind::converged;
+        found.push_back(std::exchange(sweep_, {}));
+      }
     }
     catch (const Interrupted&) // on all ranks of this share alike
     {
       sweep_.outcome.kind = OutcomeKind::interrupted;
+      found.push_back(std::move(sweep_));
     }
-    sweep_.basis = static_cast<int>(model_.shapes());
-    sweep_.passes = model_.passes();
-    return std::move(sweep_);
+    found.resize(lines.size());
+    found.back().basis = static_cast<int>(model_.shapes());
+    found.back().passes = model_.passes();
+    return found;
   }
 
 private:
-  void visit_all(const std::vector<SweepLine>& lines)
+  /// Finds the pairs that are closed at every point, of design points at the first ones, and the basis.
+  void prepare(const std::vector<SweepLine>& lines)
   {
-    progress_.emplace(comm_, "sweep", static_cast<double>(points_of(lines)));
+    progress_.emplace(comm_, problem_.name, static_cast<double>(points_of(lines)));
     for (const SweepLine& line : lines)
-      for (const std::vector<double>& values : line.points)
+      for (const std::vector<double>& values :
+           std::span(line.points).first(line.ordered ? line.points.size() : std::min(line.points.size(), prepared)))
       {
         end_if_asked(comm_);
         model_.prepare({values, line.reversed});
       }
     if (model_.model()) tolerance_ = tolerance_on(model_.model()->structure);
-    if (problem_.settings.stages >= SweepStages::modes)
-    {
-      train(lines.front());
-      if (lines.size() > 1) train(lines.back());
-    }
-    for (const SweepLine& line : lines) run_line(line);
+    if (problem_.settings.stages != SweepStages::modes) return;
+    train(lines.front());
+    if (lines.size() > 1) train(lines.back());
   }
 
   /// Makes the basis by the ends and the middle of a line that has points between them, which then need few
@@ -98,16 +104,16 @@ private:
       progress_->update(static_cast<double>(++done_), "");
       if (!now) continue;
       if (!line.ordered)
-        record(*now, {});
+        record_named(std::move(*now), before);
       else if (!before)
-        begin(*now, line);
+        begin(*now);
       else
       {
         Division division = division_between(*before, *now);
         advance(*before, *now, 0, division);
         sweep_.cut_short += division.cut_short;
       }
-      before = std::move(now);
+      if (line.ordered) before = std::move(now);
     }
   }
 
@@ -129,7 +135,7 @@ private:
     const Equilibrium& at = model_.equilibrium_at({point.values, point.reversed});
     point.closed = static_cast<int>(std::ranges::count(at.closed, 1));
     point.modes.outcome = at.outcome;
-    if (at.outcome.kind == OutcomeKind::converged && problem_.settings.stages >= SweepStages::modes)
+    if (at.outcome.kind == OutcomeKind::converged && problem_.settings.stages == SweepStages::modes)
       point.modes = model_.modes_at({point.values, point.reversed}, tolerance_of(point));
     if (point.modes.outcome.kind == OutcomeKind::converged) return true;
     point.modes.pairs.clear(); // of which some may be no modes
@@ -149,74 +155,26 @@ private:
     return point.inserted ? std::max(tolerance_, large_tolerance) : tolerance_;
   }
 
-  /// The first point of a line. Its modes have the tracks of that of the line before in this direction of rotation, or
-  /// else in the other one.
-  void begin(Followed& now, const SweepLine& line)
+  /// The first point of a line.
+  void begin(Followed& now)
   {
-    now.tracks.assign(now.modes.pairs.size(), -1);
-    if (!begins(line)) return begin_anew(now); // the group that the point is of knows its tracks
-    const std::optional<Followed>&own = starts_[now.reversed], &other = starts_[!now.reversed];
-    if (own)
-      carry_over(*own, now, 0);
-    else if (other)
-      take_numbers(*other, now);
-    begin_anew(now);
-    starts_[now.reversed] = now;
-  }
-
-  /// Gives modes without a track one of their own.
-  void begin_anew(Followed& now)
-  {
-    for (int& track : now.tracks)
-      if (track < 0) track = sweep_.tracks++;
+    now.tracks.resize(now.modes.pairs.size());
+    std::iota(now.tracks.begin(), now.tracks.end(), 0);
+    sweep_.tracks = static_cast<int>(now.tracks.size());
     record(now, {});
   }
 
-  /// Whether the first point of this line is that of a line of the sweep.
-  static bool begins(const SweepLine& line) { return !line.known || line.points.size() == 1; }
-
-  static void take_over(const Followed& before, Followed& now, const std::vector<Match>& matches)
+  /// A design point, whose modes are named by those of the first one.
+  void record_named(Followed now, std::optional<Followed>& first)
   {
-    for (std::size_t i = 0; i < matches.size(); ++i)
-      if (matches[i].to >= 0) now.tracks[static_cast<std::size_t>(matches[i].to)] = before.tracks[i];
-  }
-
-  /// Follows the modes from line to line, along the second number, with points between where they are unclear. These
-  /// belong to no line and are not recorded.
-  void carry_over(const Followed& before, Followed& now, int depth)
-  {
-    const ModeForms between_both = forms(before, now);
-    std::vector<Match> matches = follow(between_both, clear_mac);
-    if (depth < most_halvings && before.values != now.values && !all_clear(before, matches))
+    if (!first)
+      begin(first.emplace(std::move(now)));
+    else
     {
-      Followed between{now.values, now.reversed, true};
-      for (std::size_t k = 0; k < between.values.size(); ++k)
-        between.values[k] = (before.values[k] + now.values[k]) / 2;
-      if (find_modes_of(between))
-      {
-        between.tracks.assign(between.modes.pairs.size(), -1);
-        carry_over(before, between, depth + 1);
-        carry_over(between, now, depth + 1);
-        return;
-      }
+      now.tracks = names_by_shapes(first->modes, now.modes);
+      record(now, {});
+      model_.forget({now.values, now.reversed});
     }
-    if (!all_clear(before, matches)) matches = follow(between_both, least_clear(before, now));
-    take_over(before, now, matches);
-  }
-
-  /// Takes numbers from the first point in the other direction, by the eigenvalues: friction is weak there.
-  static void take_numbers(const Followed& other, Followed& now)
-  {
-    const std::vector<int> partners = nearest_partners(eigenvalues(other), eigenvalues(now));
-    for (std::size_t i = 0; i < partners.size(); ++i)
-      if (partners[i] >= 0) now.tracks[static_cast<std::size_t>(partners[i])] = other.tracks[i];
-  }
-
-  static std::vector<std::complex<double>> eigenvalues(const Followed& point)
-  {
-    std::vector<std::complex<double>> values;
-    for (const TwoSidedPair& pair : point.modes.pairs) values.push_back(pair.lambda);
-    return values;
   }
 
   ModeForms forms(const Followed& before, const Followed& now)
@@ -245,7 +203,7 @@ private:
   {
     const double size = std::max(std::abs(before.values[0]), std::abs(now.values[0]));
     const Equilibrium& at = model_.equilibrium_at({now.values, now.reversed});
-    const bool modes = problem_.settings.stages >= SweepStages::modes; // which alone jump
+    const bool modes = problem_.settings.stages == SweepStages::modes; // which alone jump
     return {threshold_tolerance * size, modes ? std::ssize(at.closed) : 0, most_between};
   }
 
@@ -421,9 +379,9 @@ private:
       const bool inside = in_band(pair, problem_.modes.band);
       point.unstable += inside && is_unstable(pair.lambda);
       const Match match = matches.empty() ? Match{0, 1, 1} : matches[k];
-      (inside ? point.modes : point.beyond)
-          .push_back({pair.lambda, now.modes.errors[k], now.tracks.empty() ? -1 : now.tracks[k],
-                      match.to >= 0 ? match.mac : 1, match.subspace});
+      if (inside)
+        point.modes.push_back({pair.lambda, now.modes.errors[k], now.tracks.empty() ? -1 : now.tracks[k],
+                               match.to >= 0 ? match.mac : 1, match.subspace});
     }
     if (point.outcome.kind == OutcomeKind::converged)
       sweep_.outcome.residual = std::max(sweep_.outcome.residual, point.outcome.residual);
@@ -436,13 +394,12 @@ private:
   Sweep sweep_;
   double tolerance_ = close_tolerance;
   std::optional<Progress> progress_;
-  std::array<std::optional<Followed>, 2> starts_{}; // of the last line in either direction of rotation
-  std::size_t done_ = 0;                            // points
+  std::size_t done_ = 0; // points
 };
 
 } // namespace
 
-Sweep visit(const SweepProblem& problem, MPI_Comm comm, const std::vector<SweepLine>& lines)
+std::vector<Sweep> visit(const SweepProblem& problem, MPI_Comm comm, const std::vector<SweepLine>& lines)
 {
   const Finally alone = one_thread(); // points are many dense problems of a few hundred rows
   return Sweeper(problem, comm).run(lines);

@@ -7,8 +7,8 @@
 namespace squeal
 {
 
-/// Visits all points of these lines. Collective. outcome: "interrupted" where the run was asked to end, else
-/// "converged"; the points done stay.
-Sweep visit(const SweepProblem& problem, MPI_Comm comm, const std::vector<SweepLine>& lines);
+/// Visits the points of each line. Collective. outcome: "interrupted" where the run was asked to end, else "converged";
+/// the points done stay. Each line has tracks of its own.
+std::vector<Sweep> visit(const SweepProblem& problem, MPI_Comm comm, const std::vector<SweepLine>& lines);
 
 } // namespace squeal

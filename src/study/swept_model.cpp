@@ -19,9 +19,8 @@ void reverse_rotation(Structure& structure, Interface& interface)
   check(MatScale(structure.G, -1));
 }
 
-SweptModel::SweptModel(SweptProblem problem, MPI_Comm comm, std::function<void()> end_if_asked)
-    : problem_(std::move(problem)), comm_(comm), end_if_asked_(std::move(end_if_asked)),
-      searched_(problem_.equilibrium_options)
+SweptModel::SweptModel(const SweepProblem& problem, MPI_Comm comm, std::function<void()> end_if_asked)
+    : problem_(problem), comm_(comm), end_if_asked_(std::move(end_if_asked)), searched_(problem_.equilibrium_options)
 {
 }
 
@@ -110,12 +109,6 @@ void SweptModel::train_at(const SweptPlace& place, double tolerance)
 {
   PointModes modes = modes_at(place, tolerance);
   if (modes.outcome.kind == OutcomeKind::converged) trained_[place] = std::move(modes);
-}
-
-void SweptModel::truncate(Eigen::Index shapes)
-{
-  squeal::truncate(*basis_, shapes);
-  trained_.clear();
 }
 
 void SweptModel::forget(const SweptPlace& place)

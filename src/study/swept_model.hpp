@@ -17,21 +17,12 @@ struct ContactChange
   std::optional<double> failed{}; // where an equilibrium failed in the search, which has no other result then
 };
 
-/// How models and modes of the points are made.
-struct SweptProblem
-{
-  std::function<BrakeModel(std::span<const double> values, MPI_Comm comm)> model_at;
-  const ModesSettings& modes;
-  const ModesOptions& modes_options;
-  const EquilibriumOptions& equilibrium_options;
-};
-
 class SweptModel
 {
 public:
   /// Calls `end_if_asked` between parts of long work: equilibria of a search, corrections of the basis.
-  SweptModel(
-      SweptProblem problem, MPI_Comm comm, std::function<void()> end_if_asked = [] {});
+  /// Borrows the problem.
+  SweptModel(const SweepProblem& problem, MPI_Comm comm, std::function<void()> end_if_asked);
 
   /// Finds the equilibrium of a point. The pairs that are closed at all points prepared are those of the basis.
   void prepare(const SweptPlace& place);
@@ -42,9 +33,6 @@ public:
 
   /// Makes the basis by a point, whose modes are then at hand when they are asked for next.
   void train_at(const SweptPlace& place, double tolerance);
-
-  /// Drops all shapes of the basis but the first ones, so many.
-  void truncate(Eigen::Index shapes);
 
   /// Gives back the memory of a point.
   void forget(const SweptPlace& place);
@@ -84,7 +72,7 @@ private:
 
   const Known& known_at(const SweptPlace& place);
 
-  SweptProblem problem_;
+  const SweepProblem& problem_;
   MPI_Comm comm_;
   std::function<void()> end_if_asked_;
   Equilibria searched_;

@@ -1,83 +1,116 @@
-#include "linear_contact.hpp"
+#include "squeal/transient/linear_contact.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <Eigen/LU>
-#include <optional>
-#include <vector>
 
 namespace squeal
-{
-
-namespace
 {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-using PairMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 2, 2>; // of tangential directions
-
-struct Slip // of a pair
+namespace
 {
-  Index first = 0, normal = 0; // its first tangential row of W, and its normal one's place among the first unknowns
-  PairMatrix turn;             // [-] columns: e, and the direction across it
-  double mu = 0;               // [-]
-  double by_coefficient = 0;   // [N] r_n dmu/d(common coefficient)
-};
 
-/// The closed pairs.
-struct Unknowns
+MatrixXd solve_with(const LeadingFactor& factor, const MatrixXd& right)
 {
-  std::vector<Index> leading; // the first unknowns: rows of W
-  std::vector<Slip> slips;
-  Index first_turned = 0; // of the directions of `turn`: the first one that has an entry of y
-  VectorXd S;             // [N s/m] the diagonal of S, by entries of y: pair by pair
+  MatrixXd x = Eigen::PermutationMatrix<Eigen::Dynamic>(factor.order) * right;
+  factor.LU.triangularView<Eigen::UnitLower>().solveInPlace(x);
+  factor.LU.triangularView<Eigen::Upper>().solveInPlace(x);
+  return x;
+}
 
-  Index size() const { return static_cast<Index>(leading.size()) + S.size(); }
-};
-
-Unknowns unknowns_of(int directions, const PairFriction& friction, const StepRecord& record,
-                     std::span<const ContactStatus> statuses)
+MatrixXd solve_transposed_with(const LeadingFactor& factor, MatrixXd x)
 {
+  factor.LU.triangularView<Eigen::Upper>().transpose().solveInPlace(x);
+  factor.LU.triangularView<Eigen::UnitLower>().transpose().solveInPlace(x);
+  return Eigen::PermutationMatrix<Eigen::Dynamic>(factor.order).transpose() * x;
+}
+
+} // namespace
+
+void LinearContact::set_unknowns(const ContactLaw& law, const StepRecord& record)
+{
+  const auto& [directions, friction, theta] = law;
   const PairRows<Index> rows(directions);
-  const PairView reactions(record.reactions, directions), velocity(record.contact_velocity, directions);
-  Unknowns result;
-  result.first_turned = depends_on_speed(friction) ? 0 : 1; // constant mu: dw_t along e does not matter
+  const PairView<const double> reactions(record.reactions, directions), velocity(record.contact_velocity, directions);
+  const std::vector<ContactStatus> statuses = contact_status(reactions, velocity, friction);
+  const PairFriction in_step = law_of_step(friction, theta);
+  first_turned_ = depends_on_speed(in_step) ? 0 : 1; // constant mu: dw_t along e does not matter
   std::vector<double> S;
   for (std::size_t pair = 0; pair < statuses.size(); ++pair)
   {
     if (statuses[pair] == ContactStatus::open) continue;
     const auto own = static_cast<Index>(pair);
-    result.leading.push_back(rows.normal(own));
-    if (statuses[pair] == ContactStatus::stick)
+    leading_.push_back(rows.normal(own));
+    const VectorXd w = VectorXd::Map(velocity.tangential(pair).data(), directions);
+    const double speed = w.norm(), reaction = reactions.normal(pair);
+    if (statuses[pair] == ContactStatus::stick || speed == 0)
     {
-      for (Index k = 0; k < directions; ++k) result.leading.push_back(rows.tangential(own) + k);
+      for (Index k = 0; k < directions; ++k) leading_.push_back(rows.tangential(own) + k);
       continue;
     }
-    const VectorXd w = VectorXd::Map(velocity.tangential(pair).data(), directions);
-    const double speed = std::max(w.norm(), 1e-300), reaction = reactions.normal(pair);
-    const FrictionLaw& law = friction.of(pair);
-    const FrictionCoefficient mu = friction_coefficient(law, speed);
-    const double by_common = friction.has_own(pair) ? 0 : share_of_coefficient(law, speed);
+    const FrictionLaw& of_pair = in_step.of(pair);
+    const FrictionCoefficient mu = friction_coefficient(of_pair, speed);
     const VectorXd e = w / speed;
     PairMatrix turn = e;
     if (directions == 2) turn = (PairMatrix(2, 2) << e(0), -e(1), e(1), e(0)).finished();
-    result.slips.push_back(
-        {rows.tangential(own), static_cast<Index>(result.leading.size()) - 1, turn, mu.value, reaction * by_common});
-    if (result.first_turned == 0) S.push_back(mu.derivative * reaction);
+    slips_.push_back({rows.tangential(own), static_cast<Index>(leading_.size()) - 1, turn, mu.value});
+    if (!in_step.has_own(pair))
+      by_coefficient_.segment(rows.tangential(own), directions) = -reaction * share_of_coefficient(of_pair, speed) * e;
+    if (first_turned_ == 0) S.push_back(mu.derivative * reaction);
     if (directions == 2) S.push_back(mu.value * reaction / speed);
   }
-  result.S = VectorXd::Map(S.data(), static_cast<Index>(S.size()));
-  return result;
+  S_ = VectorXd::Map(S.data(), static_cast<Index>(S.size()));
 }
 
-/// Rows of the first unknowns and of y, of a column with all rows of W.
-void put_rows(const Unknowns& unknowns, const double* column, double* result)
+LinearContact::LinearContact(const Eigen::Ref<const MatrixXd>& W, const ContactLaw& law, const StepRecord& record)
+    : by_coefficient_(VectorXd::Zero(W.rows()))
 {
-  for (const Index row : unknowns.leading) *result++ = column[row];
-  for (const Slip& slip : unknowns.slips)
-    for (Index d = unknowns.first_turned; d < slip.turn.cols(); ++d)
+  set_unknowns(law, record);
+  const auto leading = static_cast<Index>(leading_.size());
+  A_.resize(leading + S_.size(), leading + S_.size());
+  for_each_column(W, [&](Index j, const VectorXd& column) { put_rows(column.data(), A_.col(j).data()); });
+  // pairs that stick may have more rows than the structure has motions: their reactions are then not unique, but their
+  // velocities are
+  constexpr double more = 1e-10; // of a diagonal entry
+  for (Index i = 0; i < leading; ++i) A_(i, i) = A_.row(i).isZero(0) ? 1 : A_(i, i) * (1 + more);
+  for (Index i = leading; i < A_.rows(); ++i) A_.row(i) *= S_(i - leading);
+  A_.diagonal().tail(S_.size()).array() += 1;
+}
+
+/// Shows each column of F Q to visit(place, column).
+template <class Visit> void LinearContact::for_each_column(const Eigen::Ref<const MatrixXd>& F, Visit visit) const
+{
+  VectorXd column;
+  auto slip = slips_.begin();
+  for (Index j = 0; j < static_cast<Index>(leading_.size()); ++j)
+  {
+    column = F.col(leading_[static_cast<std::size_t>(j)]);
+    if (slip != slips_.end() && slip->normal == j)
+    {
+      for (Index k = 0; k < slip->turn.rows(); ++k) column -= slip->mu * slip->turn(k, 0) * F.col(slip->first + k);
+      ++slip;
+    }
+    visit(j, column);
+  }
+  auto at = static_cast<Index>(leading_.size());
+  for (const Slip& one : slips_)
+    for (Index d = first_turned_; d < one.turn.cols(); ++d, ++at)
+    {
+      column = one.turn(0, d) * F.col(one.first);
+      for (Index k = 1; k < one.turn.rows(); ++k) column += one.turn(k, d) * F.col(one.first + k);
+      visit(at, column);
+    }
+}
+
+void LinearContact::put_rows(const double* column, double* result) const
+{
+  for (const Index row : leading_) *result++ = column[row];
+  for (const Slip& slip : slips_)
+    for (Index d = first_turned_; d < slip.turn.cols(); ++d)
     {
       double along = 0;
       for (Index k = 0; k < slip.turn.rows(); ++k) along += slip.turn(k, d) * column[slip.first + k];
@@ -85,118 +118,83 @@ void put_rows(const Unknowns& unknowns, const double* column, double* result)
     }
 }
 
-MatrixXd rows_of(const Unknowns& unknowns, const MatrixXd& columns)
+LeadingFactor LinearContact::factor() const
 {
-  MatrixXd result(unknowns.size(), columns.cols());
-  for (Index k = 0; k < columns.cols(); ++k) put_rows(unknowns, columns.col(k).data(), result.col(k).data());
+  const auto leading = static_cast<Index>(leading_.size());
+  LeadingFactor result{A_.topLeftCorner(leading, leading), {}};
+  result.order = Eigen::VectorXi::LinSpaced(leading, 0, to_int(leading) - 1);
+  if (leading == 0 || !result.LU.allFinite()) return result; // LAPACK would leave the order unset
+  const Eigen::PartialPivLU<Eigen::Ref<MatrixXd>> in_place(result.LU);
+  result.order = in_place.permutationP().indices();
   return result;
 }
 
-/// (dw_n and dw_t of stick; dw_t where y is) by (the first unknowns; y), b apart.
-MatrixXd condense(const Unknowns& unknowns, const Eigen::Map<const MatrixXd>& W)
+MatrixXd LinearContact::rows_of(const MatrixXd& db) const
 {
-  const auto leading = static_cast<Index>(unknowns.leading.size());
-  MatrixXd result(unknowns.size(), unknowns.size());
-  for (Index j = 0; j < leading; ++j)
-    put_rows(unknowns, W.col(unknowns.leading[static_cast<std::size_t>(j)]).data(), result.col(j).data());
-  MatrixXd tangential(unknowns.size(), unknowns.slips.empty() ? 0 : unknowns.slips.front().turn.rows());
-  Index at = leading;
-  for (const Slip& slip : unknowns.slips)
-  {
-    for (Index k = 0; k < tangential.cols(); ++k)
-      put_rows(unknowns, W.col(slip.first + k).data(), tangential.col(k).data());
-    for (Index k = 0; k < tangential.cols(); ++k)
-      result.col(slip.normal) -= slip.mu * slip.turn(k, 0) * tangential.col(k);
-    for (Index d = unknowns.first_turned; d < slip.turn.cols(); ++d, ++at)
-    {
-      result.col(at) = slip.turn(0, d) * tangential.col(0);
-      for (Index k = 1; k < tangential.cols(); ++k) result.col(at) += slip.turn(k, d) * tangential.col(k);
-    }
-  }
+  MatrixXd result(A_.rows(), db.cols());
+  for (Index k = 0; k < db.cols(); ++k) put_rows(db.col(k).data(), result.col(k).data());
   return result;
 }
 
-/// Pairs that stick may have more rows than the structure has motions. Their reactions are then not unique but their
-/// velocities are; this much more of a diagonal entry makes the system regular.
-void regularise(MatrixXd& A, Index rows)
+MatrixXd LinearContact::columns_of(const Eigen::Ref<const MatrixXd>& F) const
 {
-  for (Index i = 0; i < rows; ++i)
-    if (A.row(i).isZero(0))
-      A(i, i) = 1; // a tangential row without a motion
-    else
-      A(i, i) *= 1 + 1e-10;
+  MatrixXd result(F.rows(), A_.cols());
+  for_each_column(F, [&](Index j, const VectorXd& column) { result.col(j) = column; });
+  return result;
 }
 
-/// The first unknowns and y with `b` in rows of `A`, which condense() gave and regularise() made regular; nothing where
-/// the fixed point does not contract.
-std::optional<MatrixXd> by_fixed_point(const MatrixXd& A, const VectorXd& S, const MatrixXd& b)
+/// A^-1 of the right side, by the leading block and the rest in turn.
+template <class Matrix, class Solve>
+MatrixXd LinearContact::solve_by_parts(const Matrix& A, const Solve& solve_leading, const MatrixXd& right) const
 {
-  const Index turned = S.size(), leading = A.rows() - turned;
-  const Eigen::PartialPivLU<MatrixXd> lu(A.topLeftCorner(leading, leading));
+  const Index turned = S_.size(), leading = A.rows() - turned;
   const VectorXd own = A.diagonal().tail(turned);
-  MatrixXd x = MatrixXd::Zero(b.rows(), b.cols());
+  MatrixXd x = MatrixXd::Zero(right.rows(), right.cols());
   double last = HUGE_VAL;
   for (int pass = 0; pass < 30; ++pass)
   {
-    MatrixXd right = -b.topRows(leading);
-    if (pass > 0) right.noalias() -= A.topRightCorner(leading, turned) * x.bottomRows(turned);
-    x.topRows(leading) = lu.solve(right);
+    MatrixXd of_leading = right.topRows(leading);
+    if (pass > 0) of_leading.noalias() -= A.topRightCorner(leading, turned) * x.bottomRows(turned);
+    x.topRows(leading) = solve_leading(of_leading);
     if (turned == 0) return x;
-    MatrixXd dw = b.bottomRows(turned);
-    dw.noalias() += A.bottomRows(turned) * x;
-    const MatrixXd y = ((own.array() * S.array()).matrix().asDiagonal() * x.bottomRows(turned) - S.asDiagonal() * dw)
-                           .array()
-                           .colwise() /
-                       (1 + S.array() * own.array());
-    const double change = (y - x.bottomRows(turned)).cwiseAbs().maxCoeff();
-    x.bottomRows(turned) = y;
+    MatrixXd missed = right.bottomRows(turned);
+    missed.noalias() -= A.bottomRows(turned) * x;
+    const MatrixXd step = own.cwiseInverse().asDiagonal() * missed;
+    x.bottomRows(turned) += step;
+    const double change = step.cwiseAbs().maxCoeff();
     if (change <= 1e-10 * x.cwiseAbs().maxCoeff()) return x;
-    if (pass > 2 && change > 0.5 * last) return std::nullopt;
+    if (pass > 2 && !(change <= 0.5 * last)) break;
     last = change;
   }
-  return std::nullopt;
+  return MatrixXd(A).partialPivLu().solve(right);
 }
 
-/// The same by the factors of all rows.
-MatrixXd by_whole_system(MatrixXd A, const VectorXd& S, const MatrixXd& b)
+MatrixXd LinearContact::solve(const LeadingFactor& factor, MatrixXd right) const
 {
-  const Index turned = S.size();
-  MatrixXd right = -b;
-  A.bottomRows(turned) = (S.asDiagonal() * A.bottomRows(turned)).eval();
-  A.diagonal().tail(turned).array() += 1;
-  right.bottomRows(turned) = (S.asDiagonal() * right.bottomRows(turned)).eval();
-  return A.partialPivLu().solve(right);
+  right = -right;
+  right.bottomRows(S_.size()) = (S_.asDiagonal() * right.bottomRows(S_.size())).eval();
+  return solve_by_parts(
+      A_, [&](const MatrixXd& b) { return solve_with(factor, b); }, right);
 }
 
-} // namespace
-
-MatrixXd linear_contact_response(std::span<const double> W, int directions, const PairFriction& friction,
-                                 const StepRecord& record, std::span<const ContactStatus> statuses, const MatrixXd& db,
-                                 const VectorXd& dmu)
+MatrixXd LinearContact::solve_transposed(const LeadingFactor& factor, const MatrixXd& right) const
 {
-  MatrixXd result = MatrixXd::Zero(db.rows(), db.cols());
-  const Unknowns unknowns = unknowns_of(directions, friction, record, statuses);
-  if (unknowns.leading.empty()) return result;
-  const Eigen::Map<const MatrixXd> whole(W.data(), db.rows(), db.rows());
-  const auto leading = static_cast<Index>(unknowns.leading.size());
-  MatrixXd A = condense(unknowns, whole), b = rows_of(unknowns, db);
-  if (!dmu.isZero(0))
-  {
-    VectorXd by_coefficient = VectorXd::Zero(db.rows());
-    for (const Slip& slip : unknowns.slips)
-      by_coefficient.segment(slip.first, slip.turn.rows()) = slip.by_coefficient * slip.turn.col(0);
-    b -= rows_of(unknowns, whole * by_coefficient) * dmu.transpose();
-  }
-  regularise(A, leading);
-  std::optional<MatrixXd> x = by_fixed_point(A, unknowns.S, b);
-  if (!x) x = by_whole_system(std::move(A), unknowns.S, b);
-  for (Index i = 0; i < leading; ++i) result.row(unknowns.leading[static_cast<std::size_t>(i)]) = x->row(i);
-  Index at = leading;
-  for (const Slip& slip : unknowns.slips)
+  MatrixXd result = -solve_by_parts(
+      A_.transpose(), [&](const MatrixXd& b) { return solve_transposed_with(factor, b); }, right);
+  result.bottomRows(S_.size()) = (S_.asDiagonal() * result.bottomRows(S_.size())).eval();
+  return result;
+}
+
+MatrixXd LinearContact::reactions(const MatrixXd& x) const
+{
+  MatrixXd result = MatrixXd::Zero(by_coefficient_.size(), x.cols());
+  for (std::size_t i = 0; i < leading_.size(); ++i) result.row(leading_[i]) = x.row(static_cast<Index>(i));
+  auto at = static_cast<Index>(leading_.size());
+  for (const Slip& slip : slips_)
   {
     auto own = result.middleRows(slip.first, slip.turn.rows());
-    own -= slip.turn.col(0) * (slip.mu * x->row(slip.normal) + slip.by_coefficient * dmu.transpose());
-    for (Index d = unknowns.first_turned; d < slip.turn.cols(); ++d) own += slip.turn.col(d) * x->row(at++);
+    own -= slip.mu * slip.turn.col(0) * x.row(slip.normal);
+    for (Index d = first_turned_; d < slip.turn.cols(); ++d) own += slip.turn.col(d) * x.row(at++);
   }
   return result;
 }

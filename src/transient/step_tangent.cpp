@@ -3,12 +3,13 @@
 /// and A dv+ is the right-hand side just solved for, as in the step itself.
 #include "squeal/transient/step_tangent.hpp"
 
-#include "linear_contact.hpp"
 #include "squeal/algebra/lent_cores.hpp"
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/error.hpp"
+#include "squeal/base/free_memory.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/solid/structure.hpp"
+#include "squeal/transient/linear_contact.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -120,25 +121,40 @@ struct RecordedStep
   const Interface& interface;
   const StepRecord& record;
   std::span<const double> W; // all entries, on rank 0
+  double& room;              // [byte] for factors that are kept, on rank 0
 };
+
+/// The record's own factor, else one that is kept there as long as there is room.
+const LeadingFactor& factor_of(const LinearContact& contact, const StepRecord& record, double& room,
+                               LeadingFactor& fresh)
+{
+  if (record.factor.order.size() > 0) return record.factor;
+  fresh = contact.factor();
+  room -= sizeof(double) * static_cast<double>(fresh.LU.size());
+  return room > 0 ? record.factor = std::move(fresh) : fresh;
+}
 
 /// dr of every column, on every rank. `Bv_free`: B dv_f of each, on rank 0.
 MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> columns, MatrixXd db,
                    const std::vector<double>& Bv_free)
 {
-  const auto& [step, structure, interface, record, W] = of;
+  const auto& [step, structure, interface, record, entries, room] = of;
   MatrixXd dr = MatrixXd::Zero(db.rows(), db.cols());
-  on_rank_zero_with_lent_cores(comm_of(interface.B), interface.size(),
-                               [&]
-                               {
-                                 db += MatrixXd::Map(Bv_free.data(), db.rows(), db.cols());
-                                 VectorXd dmu(db.cols());
-                                 for (Index k = 0; k < dmu.size(); ++k)
-                                   dmu(k) = columns[static_cast<std::size_t>(k)].friction;
-                                 dr = linear_contact_response(
-                                     W, interface.directions, law_of_step(interface.friction, step.theta), record,
-                                     contact_status(interface, record.reactions, record.contact_velocity), db, dmu);
-                               });
+  const auto find = [&]
+  {
+    const Eigen::Map<const MatrixXd> W(entries.data(), db.rows(), db.rows());
+    const LinearContact contact(W, {interface.directions, interface.friction, step.theta}, record);
+    if (contact.is_open()) return;
+    db += MatrixXd::Map(Bv_free.data(), db.rows(), db.cols());
+    Eigen::RowVectorXd dmu(db.cols());
+    for (Index k = 0; k < dmu.size(); ++k) dmu(k) = columns[static_cast<std::size_t>(k)].friction;
+    const VectorXd& of_coefficient = contact.by_coefficient();
+    if (!dmu.isZero(0)) db += W * of_coefficient * dmu;
+    LeadingFactor fresh;
+    const LeadingFactor& factor = factor_of(contact, record, room, fresh);
+    dr = contact.reactions(contact.solve(factor, contact.rows_of(db))) + of_coefficient * dmu;
+  };
+  on_rank_zero_with_lent_cores(comm_of(interface.B), interface.size(), find);
   MPI_Bcast(dr.data(), to_int(dr.size()), MPI_DOUBLE, 0, comm_of(interface.B));
   return dr;
 }
@@ -146,7 +162,7 @@ MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> column
 /// dv+ of every column from A dv_f in Av, with the contact that `db` starts from; Av becomes A dv+.
 void solve_columns(const RecordedStep& of, std::span<const TangentColumn> columns, MatrixXd db, TangentWork& work)
 {
-  const auto& [step, structure, interface, record, W] = of;
+  const auto& [step, structure, interface, record, W, room] = of;
   const std::vector<Vec> Av = handles(work.Av);
   MatrixXd dr = MatrixXd::Zero(0, 0);
   const std::vector<double> Bv_free = step.factor.forward(Av);
@@ -167,7 +183,7 @@ void solve_columns(const RecordedStep& of, std::span<const TangentColumn> column
 
 void one_step(const RecordedStep& of, std::span<TangentColumn> columns, TangentWork& work)
 {
-  const auto& [step, structure, interface, record, W] = of;
+  const auto& [step, structure, interface, record, W, room] = of;
   const double h = step.h, theta = step.theta;
   const std::vector<Vec> Av = handles(work.Av), v_next = handles(work.v_next);
   MatrixXd db;
@@ -223,13 +239,15 @@ void advance_tangents(const ThetaStep& step, const Structure& structure, const I
   else
     formed = whole_operator(step, interface);
   const std::span<const double> W = step.W.is_stored() ? step.W.entries() : formed;
+  constexpr double part = 0.25; // of the free memory
+  double room = part * free_memory(comm_of(structure.load));
   for (std::size_t first = 0; first < columns.size(); first += at_once)
   {
     const auto batch = columns.subspan(first, std::min(at_once, columns.size() - first));
     TangentWork work = begin_tangents(step, structure, batch);
     for (const StepRecord& record : records)
     {
-      one_step({step, structure, interface, record, W}, batch, work);
+      one_step({step, structure, interface, record, W, room}, batch, work);
       end_if_asked(comm_of(structure.load));
     }
   }

@@ -1,6 +1,5 @@
 """Runs the squeal program as a user does: by itself or by mpirun, a scene file, its output folder."""
 
-import contextlib
 import fcntl
 import importlib.machinery
 import importlib.util
@@ -8,6 +7,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -19,6 +19,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 INPUTS = ROOT / "inputs"
+sys.path.insert(0, str(ROOT / "tests" / "support"))
+from cores import cores  # noqa: E402
 
 
 def load_tool(name):
@@ -32,56 +34,6 @@ def load_tool(name):
 
 # A run that is refused ends together on all ranks; mpirun would wait two seconds for those that have ended.
 NO_WAIT = {"OMPI_MCA_odls_base_sigkill_timeout": "0"}
-
-
-held = 0  # cores that this test has
-PATIENCE = 3  # [s] that runs of fewer ranks may begin before one that waits for several cores
-
-
-def lock_cores(folder, count):
-    """The locked files of as many free cores of the machine's; none where there are fewer."""
-    locked = []
-    for number in range(len(os.sched_getaffinity(0))):
-        core = open(folder / str(number), "w")
-        try:
-            fcntl.flock(core, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            locked.append(core)
-        except BlockingIOError:
-            core.close()
-        if len(locked) == count:
-            return locked
-    for core in locked:
-        core.close()
-    return []
-
-
-@contextlib.contextmanager
-def cores(count):
-    """Waits for as many cores that no other test takes, of those that the machine has. Ranks wait for each other at every
-    message: beside a run that leaves one of them no core, each message takes a slice of the scheduler's, milliseconds."""
-    global held
-    wanted = min(count, len(os.sched_getaffinity(0)))
-    if held:  # by the test whose run this is
-        assert wanted <= held
-        yield
-        return
-    folder = Path(tempfile.gettempdir()) / f"squeal_cores_{os.getuid()}"
-    folder.mkdir(exist_ok=True)
-    patient_until = time.monotonic() + PATIENCE
-    with open(folder / "gathering", "w") as gathering:  # only who has locked it takes cores
-        fcntl.flock(gathering, fcntl.LOCK_EX)
-        while not (locked := lock_cores(folder, wanted)):
-            if time.monotonic() < patient_until:
-                fcntl.flock(gathering, fcntl.LOCK_UN)
-            time.sleep(0.01)
-            fcntl.flock(gathering, fcntl.LOCK_EX)
-    held = wanted
-    try:
-        yield
-    finally:
-        held = 0
-        for core in locked:
-            core.close()
 
 
 class Run:
@@ -108,6 +60,39 @@ class Run:
     def messages(self):
         """squeal's own error messages, one line each (mpirun adds lines of its own when a rank fails)."""
         return re.findall(r"^squeal: .*$", self.errors, re.M)
+
+
+def wait_for(condition, seconds=600):
+    """Waits for an event; the seconds are a guard against a hang, not a limit that a slow machine meets."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it never came true"
+        time.sleep(0.02)
+
+
+def interrupted(sign, *arguments, ranks=1, number=signal.SIGUSR1, after=0):
+    """Exit code, what was printed, and errors of a run that gets a signal when a line matches `sign`, or `after` seconds later.
+    A pipe that holds one line is read line by line: one process is at most two lines ahead of the signal, however busy the
+    machine is. mpirun reads ahead, so that ranks may have ended: then the exit code is not 3."""
+    read, write = os.pipe2(os.O_DIRECT)
+    fcntl.fcntl(write, fcntl.F_SETPIPE_SZ, 4096)
+    launcher = [os.environ.get("MPIEXEC", "mpirun"), "-n", str(ranks)] if ranks > 1 else []
+    command = [*launcher, os.environ["SQUEAL"], *map(str, arguments)]
+    sent, printed = False, ""
+    with cores(ranks), tempfile.TemporaryFile("w+") as errors:
+        run = subprocess.Popen(command, stdout=write, stderr=errors, env={**os.environ, **NO_WAIT})
+        os.close(write)
+        while lines := os.read(read, 65536):
+            printed += lines.decode(errors="replace")
+            if not sent and re.search(sign, printed, re.M):
+                time.sleep(after)
+                run.send_signal(number)
+                sent = True
+        os.close(read)
+        code = run.wait()
+        errors.seek(0)
+        assert sent, f"{sign} was not printed: {printed}{errors.read()}"
+        return code, printed, errors.read()
 
 
 @pytest.fixture

@@ -79,14 +79,14 @@ class Slurm:
         self.command("munged", "--force", *(f"--{option}={folder}/{name}" for option, name in files.items()))
         self.command("slurmctld", "-c", "-f", folder / "slurm.conf")
         self.command("slurmd", "-N", "localhost", "-f", folder / "slurm.conf")
-        wait_for(lambda: self.command("sinfo", "-h", "-o", "%t", check=False) == "idle", 20, self.logs)
+        wait_for(lambda: self.command("sinfo", "-h", "-o", "%t", check=False) == "idle", 300, self.logs)
 
     def stop(self):
         for name in reversed(DAEMONS):
             file = self.folder / f"{name}.pid"
             if file.exists():
                 os.kill(int(file.read_text()), signal.SIGTERM)
-                wait_for(lambda: not file.exists(), 10, self.logs)
+                wait_for(lambda: not file.exists(), 300, self.logs)
 
     def logs(self):
         return "".join(file.read_text(errors="replace")[-2000:] for file in self.folder.glob("*.log"))
@@ -104,10 +104,10 @@ class Slurm:
         """What Slurm says of a job, by its own words."""
         return dict(re.findall(r"(\w+)=(\S*)", self.command("scontrol", "--oneliner", "show", "job", number)))
 
-    def wait_for_state(self, number, states, seconds=60):
+    def wait_for_state(self, number, states, seconds=600):
         """The job, once it is in one of the states."""
         wait_for(lambda: self.job(number)["JobState"] in states, seconds, lambda: f"{self.job(number)} {self.logs()}")
         return self.job(number)
 
-    def ended(self, number, seconds=60):
+    def ended(self, number, seconds=600):
         return self.wait_for_state(number, ("COMPLETED", "FAILED", "CANCELLED", "TIMEOUT", "NODE_FAIL"), seconds)

@@ -30,8 +30,7 @@ def test_a_small_motion_is_followed_without_being_asked(converged):
 
 def test_ranks(module_run):
     """Ranks agree on what is reached."""
-    one = module_run(*SCENE, "--set", "cycle.starts=4", ranks=1)["attractors"]["motions"]
-    two = module_run(*SCENE, "--set", "cycle.starts=4", ranks=2)["attractors"]["motions"]
+    one, two = (module_run(*SCENE, "--set", "cycle.starts=2", ranks=ranks)["attractors"]["motions"] for ranks in (1, 2))
     assert [motion["starts"] for motion in one] == [motion["starts"] for motion in two]
     for a, b in zip(one, two):
         assert a["mean_fluctuating_energy"] == pytest.approx(b["mean_fluctuating_energy"], rel=1e-6)

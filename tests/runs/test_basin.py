@@ -24,11 +24,10 @@ def two_oscillators(folder, damping=1.0, slower=SLOWER):
     return [scene, "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=100"]
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_a_torus_is_what_the_motion_settles_on(squeal, tmp_path, ranks):
+def test_a_torus_is_what_the_motion_settles_on(squeal, tmp_path):
     """The cycle of either oscillator leaves the other at rest: it solves the equations and nothing ever settles there.
     Both base frequencies are known: 1e-3, as 100 steps a period leave 3e-4 of the period."""
-    run = squeal(*two_oscillators(tmp_path), ranks=ranks)
+    run = squeal(*two_oscillators(tmp_path), ranks=1)
     report = run.report
     assert run.code == 0 and report["modes"]["unstable_count"] == 2
     assert report["cycle"]["outcome"] == "settled" and "repels" in report["cycle"]["reason"]
@@ -172,14 +171,14 @@ def amplitude_of(converged, *arguments):
     return run.report["estimate"]["amplitude"]
 
 
-@pytest.mark.parametrize("factor", [0.2, 5, 20])
-def test_the_oscillator_leads_to_one_cycle_from_afar(converged, factor):
+def test_the_oscillator_leads_to_one_cycle_from_afar(converged):
     oscillator = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false"]
-    start = factor * amplitude_of(converged, *oscillator)
-    cycle = converged(*oscillator, "--set", "cycle.steps_per_period=100", "--set", "cycle.tolerance=1e-6", "--set",
-                      "cycle.start=mode", "--set", f"cycle.amplitude={start!r}", ranks=1).report["cycle"]
-    assert cycle["period"] == pytest.approx(5.954461004653, rel=1e-3)
-    assert cycle["mean_energy"] == pytest.approx(1.77650678461, rel=1e-2)
+    estimate = amplitude_of(converged, *oscillator)
+    for factor in (0.2, 20):
+        cycle = converged(*oscillator, "--set", "cycle.steps_per_period=100", "--set", "cycle.tolerance=1e-6", "--set",
+                          "cycle.start=mode", "--set", f"cycle.amplitude={factor * estimate!r}", ranks=1).report["cycle"]
+        assert cycle["period"] == pytest.approx(5.954461004653, rel=1e-3), factor
+        assert cycle["mean_energy"] == pytest.approx(1.77650678461, rel=1e-2), factor
 
 
 PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=3", "--set", "modes.method=full",
@@ -216,10 +215,9 @@ def test_the_projection_finds_the_multiplier_of_arnoldi(squeal):
     assert largest["error"] > 1.2e-4 and "reaches across 1" in found["would_decide"]
 
 
-@pytest.mark.parametrize("change", [[], ["friction.coefficient=0.5", "contact.0.velocity.0=0.5"],
-                                    ["friction.coefficient=0.48", "damping.beta=4e-7"]])
+@pytest.mark.parametrize("change", [[], ["friction.coefficient=0.48", "damping.beta=4e-7"]])
 def test_the_projection_finds_a_multiplier_that_its_reduced_model_lacks(squeal, tmp_path, change):
-    """1.1995, 1.195 and 1.276 by the whole matrix, all complex. The reduced model of the recorded contact has none above
+    """1.1995 and 1.276 by the whole matrix, all complex. The reduced model of the recorded contact has none above
     0.96. 1e-4: passes end when a multiplier changes by 2.5e-7, and the cycle's residual of 1e-5 is amplified."""
     scene = [write_block_on_plate(tmp_path), "-cycle_free_periods", "0", "-settled_periods", "1"]
     scene += [word for key in change for word in ("--set", key)]

@@ -59,12 +59,11 @@ def test_the_branch_starts_at_the_hopf_point(friction):
 
 @pytest.mark.parametrize("key, start, end, override", [
     ("contact.0.velocity.0", 0.5, 0.8, "contact.0.velocity=[{},0,0]"),
-    ("spring.0.damping", 0.01, 0.03, "spring.0.damping={}"),
     ("force.0.vector.1", -1.2, -0.9, "force.0.vector=[0,{},0]"),
 ])
 def test_any_number_of_the_scene(key, start, end, override, converged):
     """Models are built again at each value: the last point is the cycle of the scene with that value."""
-    report = converged(*SCENE, *branch_of(key, start, end), "--set", "branch.points=6", ranks=1).report
+    report = converged(*SCENE, *branch_of(key, start, end), "--set", "branch.points=3", ranks=1).report
     points = report["branch"]["points"]
     assert [points[0]["parameter"], points[-1]["parameter"]] == [start, end]
     single = converged(*SCENE, "--set", override.format(end), ranks=1).report["cycle"]
@@ -75,7 +74,7 @@ def test_any_number_of_the_scene(key, start, end, override, converged):
 def test_ranks_agree_on_the_events(module_run):
     """From the Hopf point past first stick: all events lie there."""
     narrow = [*SCENE, *branch_of("friction.coefficient", 0.15, 0.22), "--set", "friction.coefficient=0.2", "--set",
-              "branch.points=4"]
+              "branch.points=2", "--set", "cycle.steps_per_period=100"]
     one, other = (module_run(*narrow, ranks=ranks) for ranks in (1, 2))
     for report in (one, other):
         assert [kind for kind, *_ in events(report)] == ["Hopf", "first lift-off", "first stick"]
@@ -83,7 +82,7 @@ def test_ranks_agree_on_the_events(module_run):
         assert abs(first - second) <= error + 1e-9
     for first, second in zip(one["branch"]["points"], other["branch"]["points"], strict=True):
         assert first["parameter"] == pytest.approx(second["parameter"], rel=1e-6)
-        assert first["period"] == pytest.approx(second["period"], rel=5e-6)
+        assert first["period"] == pytest.approx(second["period"], rel=2e-5)  # 5e-6 at 200 steps
 
 
 PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "modes.method=full", "--set", "transient.enabled=false", "--set",
@@ -92,31 +91,24 @@ PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "modes.method=full", "--s
 
 @pytest.fixture(scope="module")
 def reduced(module_run):
-    return module_run(*PIN, *branch_of("friction.coefficient", 0.285, 0.315), "--set", "branch.corrections=3", ranks=1)
+    return module_run(*PIN, *branch_of("friction.coefficient", 0.285, 0.315), ranks=1)
 
 
-def test_a_reduced_branch_is_near_the_full_model(reduced, converged):
-    """The full model, which the test above holds to single runs, closes beside the reduced one's cycles."""
+def test_a_reduced_branch_is_near_the_full_model(reduced):
+    """The full model's own cycle lies beside the reduced one's."""
     branch = reduced["branch"]
     assert branch["model"] == "reduced" and branch["ends"] == {"backward": "bound", "forward": "bound"}
     assert branch["reduction"]["missed_pairs"] == 0 and branch["reduction"]["interpolation_error"] < 1e-5
-    corrections = branch["reduction"]["corrections"]
-    assert [round(point["parameter"], 9) for point in corrections] == [0.285, 0.3, 0.315]
-    for corrected in corrections:
-        point = min(branch["points"], key=lambda point: abs(point["parameter"] - corrected["parameter"]))
-        assert corrected["converged"] and corrected["residual"] <= 1e-5
+    for point in branch["points"]:
         # One period of the full model misses the reduced cycle by 4 % of its motion. Its energy is off by about as much,
         # its period, which is stationary there to first order, by a part of the square: a thousandth.
         assert 1e-4 < point["full_residual"] < 0.1
-        assert point["frequency_hz"] == pytest.approx(corrected["frequency_hz"], rel=2e-3)
-        assert point["mean_fluctuating_energy"] == pytest.approx(corrected["mean_fluctuating_energy"], rel=0.05)
-    own = reduced["cycle"]
-    assert corrections[1]["frequency_hz"] == pytest.approx(1 / own["period"], rel=1.7e-4)
-    assert corrections[1]["mean_fluctuating_energy"] == pytest.approx(own["mean_fluctuating_energy"], rel=1e-3)
+    own, point = reduced["cycle"], min(branch["points"], key=lambda point: abs(point["parameter"] - 0.3))
+    assert point["frequency_hz"] == pytest.approx(1 / own["period"], rel=2e-3)
+    assert point["mean_fluctuating_energy"] == pytest.approx(own["mean_fluctuating_energy"], rel=0.05)
 
 
 def test_ranks_agree_on_a_reduced_branch(reduced, module_run):
-    """Without corrections, which nothing here looks at and which take longer than the branch."""
     other = module_run(*PIN, *branch_of("friction.coefficient", 0.285, 0.315), ranks=2)
     assert [kind for kind, *_ in events(reduced)] == [kind for kind, *_ in events(other)] == ["grazing"]
     for (_, first, error), (_, second, other_error) in zip(events(reduced), events(other)):
@@ -149,7 +141,6 @@ def test_a_branch_passes_jumps_of_the_map_to_its_fold_and_hopf_point(converged, 
     hopf, = [event["parameter"] for event in branch["events"] if event["kind"] == "Hopf"]
     assert 0.443 < fold < 0.444 and hopf == pytest.approx(0.499772, abs=1e-5)
     assert branch["points"][0]["parameter"] == pytest.approx(hopf, abs=1e-4)
-    assert branch["coexistence"] == [{"from": pytest.approx(fold), "to": pytest.approx(hopf)}]
 
 
 @pytest.mark.parametrize("key, start, end, words", [
@@ -196,8 +187,6 @@ def test_falling_friction_is_followed_round_its_fold_to_the_hopf_point(converged
     hopf, = [event for event in branch["events"] if event["kind"] == "Hopf" and event["parameter"] > 0.18][:1]
     fold, = [event for event in branch["events"] if event["kind"] == "fold"]
     assert fold["parameter"] > hopf["parameter"] + fold["error"]
-    both, = branch["coexistence"]
-    assert both == {"from": hopf["parameter"], "to": fold["parameter"]}
     last = branch["points"][-1]
     assert last["parameter"] == pytest.approx(hopf["parameter"], rel=1e-4)  # 1e-2 of its way from the fold
 

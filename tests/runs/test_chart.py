@@ -69,7 +69,7 @@ def draw(folder, *more, steps=(50, 100), options=()):
     command = [sys.executable, ROOT / "tools" / "chart", INPUTS / "oscillator" / "scene.toml", "--runs", folder / "runs",
                "--picture", folder / "chart.png", "--at", 50, "--reference", 400, "--steps", *steps, "--direct", 50,
                "--periods", 40, "--only", "step", "full", "direct", *more, "--", *options]
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=120, env=os.environ)
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=300, env=os.environ)
     return done.returncode, done.stdout + done.stderr
 
 

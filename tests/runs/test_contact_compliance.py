@@ -118,19 +118,6 @@ def test_cycles_of_the_reduced_and_of_the_full_model_agree(converged):
     assert full["cycle"]["open_pairs_max"] > 0
 
 
-def test_reduced_matrices_keep_the_compliance(converged):
-    words = [*PIN, "--set", "cycle.enabled=false", "--set", "contact.0.compliance=5e-13"]
-    run = converged(*words, "--set", "modes.reduced_matrices=true", ranks=1)
-    scene = run.output / "again.toml"
-    scene.write_text('[matrices]\nfolder = "reduced"\n[friction]\ncoefficient = 0.3\n[modes]\nband = 20000\nmethod = "full"\n')
-    again = converged(scene, ranks=1)
-    first, second = (r.report["modes"]["modes"] for r in (run, again))
-    assert len(first) == len(second)
-    for one, other in zip(first, second):  # backward errors of both problems
-        assert other["frequency_hz"] == pytest.approx(one["frequency_hz"], rel=1e-8)
-        assert abs(other["growth_rate"] - one["growth_rate"]) < 1e-8 * 2 * np.pi * one["frequency_hz"]
-
-
 def test_a_negative_compliance_is_refused(squeal):
     run = squeal(*PIN, "--set", "contact.0.compliance=-1e-12", ranks=1)
     assert run.code == 1

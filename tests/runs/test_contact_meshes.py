@@ -84,12 +84,12 @@ def line_contact(converged, folder, per_radius, kind, ratio):
     return found / a - 1, pressure.max() / peak - 1, run.report["equilibrium"]["iterations"]
 
 
-@pytest.mark.parametrize("kind, sizes, bound", [("brick", (6, 12, 24), 0.013), ("brick20", (6, 12, 24), 0.013),
+@pytest.mark.parametrize("kind, sizes, bound", [("brick", (6, 12, 24), 0.013), ("brick20", (6, 12), 0.013),
                                                 ("tetrahedron10", (6, 12), 0.018)])
 def test_a_cylinder_presses_as_hertz_says(converged, tmp_path, kind, sizes, bound):
     """The plane's elements are 1.5 times as long as the cylinder's. With 6, 12 and 24 nodes a contact radius the radius is
     off by 0.38, 0.11, 0.016 % (8-node bricks), 1.09, 0.34, 0.10 % (20-node bricks) and 1.50, 0.37, 0.11 % (10-node
-    tetrahedra): second order. The bound is a fifth above the largest at 6 and falls with order 1.6; the tetrahedra run
+    tetrahedra): second order. The bound is a fifth above the largest at 6 and falls with order 1.6; quadratic elements run
     without 24. Peak pressures are off by 0.72, 0.003, 0.098 %, by 0.18, 0.05, 0.007 % and by 0.70, 0.10, 0.013 %: second
     order of quadratic elements, first order bounds all. Matching meshes have radii off by 0.75, 0.15, 0.026 %, by 1.12,
     0.41, 0.10 % and by 1.14, 0.43, 0.11 %. The status iterations differ by one at most."""
@@ -107,11 +107,11 @@ def test_a_cylinder_presses_as_hertz_says(converged, tmp_path, kind, sizes, boun
 
 
 def test_the_disc_brake_meshed_apart(converged):
-    """10-node tetrahedra: 1 and 3 ranks agree, all of the pistons' force passes through the pads, moments balance."""
-    one, three = (converged(INPUTS / "disc_brake" / "scene.toml", "--set", "transient.periods=1", ranks=ranks).report
-                  for ranks in (1, 3))
+    """10-node tetrahedra: 1 and 2 ranks agree, all of the pistons' force passes through the pads, moments balance."""
+    one, two = (converged(INPUTS / "disc_brake" / "scene.toml", "--set", "transient.periods=1", ranks=ranks).report
+                  for ranks in (1, 2))
     assert len(one["modes"]["modes"]) > 20
-    for a, b in zip(one["modes"]["modes"], three["modes"]["modes"], strict=True):
+    for a, b in zip(one["modes"]["modes"], two["modes"]["modes"], strict=True):
         assert b["frequency_hz"] == pytest.approx(a["frequency_hz"], rel=1e-9)
         assert b["growth_rate"] == pytest.approx(a["growth_rate"], rel=1e-6, abs=1e-6)
     assert one["modes"]["unstable_count"] == 3

@@ -1,5 +1,6 @@
 """tools/mesh: what decks say beside their mesh becomes tables of a scene that runs without an edit."""
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -203,6 +204,8 @@ def test_names_surfaces_and_contacts_of_optistruct(tmp_path, squeal):
     assert scene["contact"] == [{"rotor": "strip_top", "stator": "pad_bottom", "friction": 0.4}]
     assert scene["pressure"] == [{"on": "pressed", "value": 1e5}] and scene["modes"] == {"band": 9000}
     assert '"corner"' in (tmp_path / "out" / "deck.msh").read_text()
+    assert scene["rotor"][0]["part"] == "strip" and "velocity" in squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).messages[0]
+    (tmp_path / "out" / "scene.toml").write_text(driven(tmp_path / "out" / "scene.toml"))
     assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
 
 
@@ -247,8 +250,110 @@ def test_commands_of_ansys(tmp_path, squeal):
     assert [part["name"] for part in scene["part"]] == ["material_1"] and scene["part"][0]["young"] == 2e11
     assert scene["support"] == [{"on": "BASE", "fixed": "x y z"}] and scene["gravity"] == [0, 0, -9.81]
     assert scene["force"] == [{"on": "node_13", "vector": [0, 0, -8]}]
-    assert scene["contact"] == [{"rotor": "target_7", "stator": "contact_7", "friction": 0.4}]
+    assert scene["contact"] == [{"rotor": "target_7", "stator": "contact_7", "friction": 0.4, "velocity": scene["contact"][0]["velocity"]}]
+    (tmp_path / "out" / "scene.toml").write_text(driven(tmp_path / "out" / "scene.toml"))
     assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
+
+
+@pytest.mark.parametrize("component, table, expected", [
+    ("       1\n(8i10)\n         1\n", "rotor", [{"part": "TURNS", "axis": [0, 0, 1], "rate": 10}]),
+    ("       1\n(8i10)\n         3\n", "contact", [{"rotor": "target_7", "stator": "contact_7", "friction": 0.4, "rotation": {"axis": [0, 0, 1], "rate": 10}}]),
+])
+def test_rotors_of_ansys(tmp_path, component, table, expected):
+    """CMROTATE of solids is a [[rotor]], of one side's elements the drive of their contact."""
+    rows = [(1, 1, 1, 1, [*range(1, 9)]), (2, 2, 1, 1, [*range(9, 17)]), (3, 3, 2, 7, [5, 6, 7, 8]), (4, 3, 3, 7, [9, 12, 11, 10])]
+    more = f"CMBLOCK,TURNS,ELEM,{component}MPDATA,R5.0, 1,MU  ,     3, 1, 0.4    ,\nCMROTATE,TURNS,,,10\n"
+    scene, left_out = converted(tmp_path, cdb(rows, more), "deck.cdb")
+    assert scene[table] == expected and left_out == []
+
+
+@pytest.mark.parametrize("pilot, option, table", [(1, "", "rigid_body"), (1, "KEYOPT,3,4,1\n", "coupling"), (0, "KEYOPT,3,12,5\n", "tie")])
+def test_bonded_and_pilot_contacts_of_ansys(tmp_path, pilot, option, table):
+    """A target of one node leads the contact's surface; a contact that is always bonded is a tie."""
+    rows = [*BRICK_ROWS, (3, 3, 2, 7, [17] if pilot else [5, 6, 7, 8]), (4, 3, 3, 7, [9, 12, 11, 10])]
+    scene, left_out = converted(tmp_path, cdb(rows, option, [*AT, (0.5, 0.5, 3)]), "deck.cdb")
+    assert len(scene[table]) == 1 and "contact" not in scene and left_out == []
+
+
+@pytest.mark.parametrize("constants", ["R,9,2,2,2,.1,.2,.3\n", "RLBLOCK,       1,       9,       6,       7\n(2i8,6g16.9)\n(7g16.9)\n"
+                                       + f"{9:8d}{6:8d}" + "".join(f"{v:16.9G}" for v in (2, 2, 2, .1, .2, .3)) + "\n"])
+def test_masses_of_ansys(tmp_path, constants):
+    """At the pilot of a surface, with its inertia, and at a node of an element, which has none."""
+    rows = [*BRICK_ROWS, (3, 3, 2, 7, [17]), (4, 3, 3, 7, [9, 12, 11, 10]), (5, 1, 5, 9, [17]), (6, 1, 6, 9, [13])]
+    deck = cdb(rows, constants + "KEYOPT,6,3,2\n", [*AT, (0.5, 0.5, 3)]).replace("ET,4,186\n", "ET,4,186\nET,5,21\nET,6,21\n")
+    scene, left_out = converted(tmp_path, deck, "deck.cdb")
+    assert scene["rigid_body"][0]["mass"] == 2 and scene["rigid_body"][0]["inertia"] == [0.1, 0.2, 0.3, 0, 0, 0]
+    assert scene["mass"] == [{"on": "node_13", "mass": 2}] and left_out == []
+
+
+def test_nodes_with_one_force_are_a_group(tmp_path):
+    """Of commands and of cards: the sum of their forces acts on all; so are nodes of a line each that are held alike."""
+    more = "".join(f"F,{n},FZ,-8.\n" for n in (13, 14, 15, 16)) + "F,9,FX,3.\n"
+    scene, _ = converted(tmp_path, cdb(BRICK_ROWS, more), "deck.cdb")
+    assert scene["force"] == [{"on": "node_9", "vector": [3, 0, 0]}, {"on": "loaded_1", "vector": [0, 0, -32]}]
+    bdf = GRIDS + "".join(f"FORCE,2,{n},,8.,0.,0.,-1.\n" for n in (13, 14, 15, 16))
+    assert converted(tmp_path, bdf, "deck.bdf")[0]["force"] == [{"on": "loaded_1", "vector": [0, 0, -32]}]
+    steps = "".join(f"*STEP\n*STATIC\n*CLOAD\n13, 3, {size}\n14, 3, {size}\n*END STEP\n" for size in (-2, -8))
+    scene, _ = converted(tmp_path, BRICKS + "*BOUNDARY\n13, 1\n14, 1\n" + steps)
+    assert scene["force"] == [{"on": "loaded_1", "vector": [0, 0, -16]}] and scene["step"][0]["forces"] == [0.25]
+    assert scene["support"] == [{"on": "base", "fixed": "x y z"}, {"on": "loaded_1", "fixed": "x"}]
+
+
+WRONG_NAMES = {
+    "deck.inp": [("*CONTACT PAIR\nhigh_botom, low_top\n", "'high_botom' is not defined .is it high_bottom"), ("*TIE, NAME=t\nlow_top, high\n", "'high'"),
+                 ("*CONTACT PAIR, INTERACTION=rubb\nhigh_bottom, low_top\n*SURFACE INTERACTION, NAME=rub\n", "is it rub"),
+                 ("*DSLOAD\nhigh_tops, P, 1.\n", "is it high_top"), ("*COUPLING, REF NODE=100, SURFACE=lid, CONSTRAINT NAME=c\n*KINEMATIC\n", "'lid'"),
+                 ("*CLOAD\n999, 3, 1.\n", "node 999"), ("*BOUNDARY\n999, 1\n", "node 999"), ("*BOUNDARY\nbas, 1\n", "is it base"),
+                 ("*SOLID SECTION, ELSET=low, MATERIAL=m, ORIENTATION=o\n", "orientation 'o'"),
+                 ("*MOTION, TRANSLATION\nbase, , 3.\n", "MOTION.*blank.*a set of nodes, a motion from 1 to 3, and a velocity"),
+                 ("*MOTION, TRANSLATION\nlow, 1, 3.\n", "MOTION.*'low' is a set of elements; expected a node or a set of nodes"),
+                 ("*CHANGE FRICTION, INTERACTION=rub\n*FRICTION\n0.1\n", "interaction 'RUB'")],
+    "deck.bdf": [("CONTACT,1,0.5,12,11\n", "surface '12'"), ("SURF,11,ELFACE,,,,,,\n,1,5,7\nSURF,12,ELFACE,,,,,,\n,2,9,11\nCONTACT,1,50,12,11\n", "property '50'"),
+                 ("CBAR,9,3,100,101,1.,0.,0.\n", "property '3'"), ("LOAD,3,1.,1.,7\nFORCE,2,13,,1.,1.,0.,0.\n", "set '7'"), ("CELAS1,9,3,100,3\n", "property '3'")],
+    "deck.cdb": [("R,5,1,1,1\n", "MASS21: the real constant '9'"), ("CMROTATE,DISK,,,10\n", "component of elements 'DISK'.*known are DISC")],
+}
+
+
+@pytest.mark.parametrize("name, more, words", [(name, *case) for name, cases in WRONG_NAMES.items() for case in cases])
+def test_what_a_deck_names_and_does_not_define_is_refused(tmp_path, name, more, words):
+    """With its line, the nearest name and those that are there: nothing of the kind is lost and called complete."""
+    mass = [(7, 1, 5, 9, [13])] if "R,5" in more else []
+    component = "CMBLOCK,DISC,ELEM,       1\n(8i10)\n         1\n"
+    (tmp_path / name).write_text({"deck.inp": BRICKS + more, "deck.bdf": ("LOAD = 3\nBEGIN BULK\n" if "LOAD" in more else "") + GRIDS + more, "deck.cdb": cdb(mass + BRICK_ROWS, component + more).replace("ET,4", "ET,5,21\nET,4")}[name])
+    with pytest.raises(TOOL.Problem, match=f"line .*{words}" if "LOAD" not in more else words):
+        TOOL.read_deck(tmp_path / name)
+
+
+def test_a_contact_whose_surface_has_no_faces_stays_with_a_gap(tmp_path, squeal, capsys):
+    scene, _ = converted(tmp_path, BRICKS + "*SURFACE, NAME=drum, TYPE=CYLINDER\nSTART, 0, 1\n*CONTACT PAIR\nhigh_bottom, drum\n")
+    assert scene["contact"][0]["rotor"].startswith("FILL IN [a surface]: drum") and "1 line with FILL IN" in capsys.readouterr().out
+    assert "FILL IN" in squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).messages[0]
+
+
+def test_a_deck_without_a_contact_says_so(tmp_path, capsys):
+    converted(tmp_path, BRICKS)
+    said = capsys.readouterr().out
+    assert "no contact was found" in said and "scene.toml: complete" in said and "FILL IN" not in (tmp_path / "out" / "scene.toml").read_text()
+
+
+def test_moduli_in_megapascal_need_a_unit(tmp_path):
+    """The largest decides: a shim of rubber in a deck of steel is none; a unit that is given is believed."""
+    deck = BRICKS.replace("2e11", "2e5")
+    with pytest.raises(SystemExit, match="2e.05|200000.*--length 0.001 --force 1.*--length 1"):
+        converted(tmp_path, deck)
+    assert converted(tmp_path, deck, words=("--length", "1"))[0]["part"][0]["young"] == 2e5
+    assert converted(tmp_path, deck, words=("--length", "0.001"))[0]["part"][0]["young"] == 2e11
+    converted(tmp_path, BRICKS + "*MATERIAL, NAME=rubber\n*ELASTIC\n5e5, 0.4\n")
+
+
+def test_loss_factors_ask_for_no_frequency(tmp_path, squeal):
+    """Modes need none. Where the deck says one, it is that."""
+    lossy = GRIDS.replace("7800.\n", "7800.,,,0.02\n")
+    scene, _ = converted(tmp_path, lossy + "EIGRL,5,,9000.\n", "deck.bdf")
+    assert scene["damping"] == {"loss_frequency": 4500} and scene["estimate"] == {"enabled": False}
+    assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
+    scene, left_out = converted(tmp_path, lossy + "PARAM,W4,12566.370614359\n", "deck.bdf")
+    assert scene["damping"]["loss_frequency"] == pytest.approx(2000) and "estimate" not in scene and left_out == []
 
 
 def test_degenerate_bricks_of_ansys(tmp_path):
@@ -372,10 +477,16 @@ def test_bodies_of_step_files_are_parts(tmp_path):
     assert all(kind == "tet10" for kind, _ in model.elements.values())
 
 
+def driven(scene):
+    """Its text with a velocity in the one gap that a deck without a motion leaves."""
+    text, count = re.subn(r'velocity = "FILL IN .*"', "velocity = [1, 0, 0]", scene.read_text())
+    assert count == 1 and "FILL IN [" not in text
+    return text
+
+
 def slid(scene):
     """The scene with its contact driven, and its modes alone."""
-    text = scene.read_text().replace("friction = 0.5", "friction = 0.5\nvelocity = [1, 0, 0]")
-    scene.write_text(text + '\n[modes]\nmethod = "full"\nband = 2000\n\n[estimate]\nenabled = false\n')
+    scene.write_text(driven(scene) + '\n[modes]\nmethod = "full"\nband = 2000\n\n[estimate]\nenabled = false\n')
     return scene
 
 

@@ -8,7 +8,7 @@ import signal
 import subprocess
 
 import pytest
-from conftest import INPUTS
+from conftest import INPUTS, interrupted
 
 OSCILLATOR = INPUTS / "oscillator" / "scene.toml"
 STAGES = ("equilibrium …", "modes …")
@@ -40,17 +40,8 @@ OPTIONS = {
     "a solver that the equilibrium has not": (["-equilibrium_ksp_rtol", "1"], ["-equilibrium_ksp_rtol"]),
     "an eigensolver that needs a preconditioner": (["-modes_pep_type", "jd"], ["-modes_pep_type jd"]),
     "a Newton method that needs subdomains": (["-cycle_snes_type", "aspin"], ["-cycle_snes_type aspin"]),
-    "a solver's view of no format": (["-cycle_snes_view", "::magic"], ["-cycle_snes_view", "ascii_info"]),
-    "a solver's view on the screen": (["-cycle_snes_monitor_solution", "draw"], ["-cycle_snes_monitor_solution", "draw"]),
-    "a solver's view where there is no folder": ([*TOAR, "-modes_pep_view", ":/no/such/y"], ["-modes_pep_view", "/no/such"]),
     "less than one step": (["--set", "transient.periods=1e-9"], ["transient.periods", "one time step"]),
     "no file of options": (["-options_file", "missing"], ["-options_file", "missing"]),
-    "a log of no format": (["-log_view", "foo:bar:baz"], ["-log_view", "foo"]),
-    "a log of no known format": (["-log_view", ":log.txt:magic"], ["-log_view", "ascii_xml"]),
-    "a log where there is no folder": (["-log_view", ":/no/such/x"], ["-log_view", "/no/such"]),
-    "a history where there is no folder": (["-history", "/no/such/h"], ["-history", "/no/such"]),
-    "a trace whose name is too long": (["-log_trace", "x" * 3000], ["-log_trace", "too long"]),
-    "no truth value": (["-malloc_debug", "many"], ["-malloc_debug", "true or false"]),
     "a state where there is no folder": (["--set", "transient.save_state=no/such/x"], ["save_state", "no/such"]),
     "a state that is a folder": (["--set", "transient.save_state=matrices"], ["save_state", "folder"]),
     "a probe without a name": (["--set", "probe.0.name=."], ["probe", "name"]),
@@ -76,9 +67,9 @@ def test_one_message_before_the_first_stage(squeal, name):
 def scene_of(given):
     """A model on which the solver of these options works: small ones are solved whole by LAPACK."""
     if "toar" in given:
-        return [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=3", "--set", "cycle.enabled=false",
-                "--set", "modes.method=full"]
-    return [OSCILLATOR, "--set", "transient.enabled=false"]
+        return [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
+                "--set", "modes.method=full", "--set", "modes.band=5000", "--set", "estimate.enabled=false"]
+    return [OSCILLATOR, "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=60"]
 
 
 # what is given beside a run whose cycle needs no subspace, and words of the message by which the stage or the end fails
@@ -202,20 +193,15 @@ def test_options_beside_a_matrix_are_not_obeyed(squeal, tmp_path):
 
 def test_a_signal_ends_a_sweep_while_its_equilibria_are_sought(tmp_path):
     """A million of them take minutes, and no mode is sought before."""
-    command = [os.environ["SQUEAL"], OSCILLATOR, "--output", tmp_path / "results", "--set", "sweep.key=friction.coefficient", "--set",
-               "sweep.from=0.1", "--set", "sweep.to=0.5", "--set", "sweep.points=1000000", "--set", "cycle.enabled=false", "--set",
-               "transient.enabled=false"]
-    run = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    for line in run.stdout:
-        if line.startswith("sweep"):
-            break
-    run.send_signal(signal.SIGTERM)
-    assert "ended by SIGTERM" in run.communicate(timeout=60)[0] and run.returncode == 3
+    arguments = [OSCILLATOR, "--output", tmp_path / "results", "--set", "sweep.key=friction.coefficient", "--set", "sweep.from=0.1", "--set",
+                 "sweep.to=0.5", "--set", "sweep.points=1000000", "--set", "cycle.enabled=false", "--set", "transient.enabled=false"]
+    code, printed, errors = interrupted("^sweep", *arguments, number=signal.SIGTERM)
+    assert "ended by SIGTERM" in printed and code == 3, errors
 
 
 def run_here(folder, *arguments, **environment):
     return subprocess.run([os.environ["SQUEAL"], OSCILLATOR, "--dry-run", *arguments], cwd=folder, capture_output=True,
-                          text=True, timeout=100, env=os.environ | environment)
+                          text=True, timeout=300, env=os.environ | environment)
 
 
 def test_a_working_folder_that_is_gone_is_one_message(tmp_path):
@@ -258,7 +244,7 @@ def test_points_beyond_the_memory_are_refused(squeal, points):
 def test_an_output_that_no_folder_can_have_is_refused(tmp_path, name):
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     done = subprocess.run([os.environ["SQUEAL"], OSCILLATOR, "--output", tmp_path / name], capture_output=True, text=True,
-                          timeout=30, cwd=tmp_path)
+                          timeout=300, cwd=tmp_path)
     assert done.returncode == 1 and "--output DIR" in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
 
 
@@ -274,4 +260,4 @@ def test_large_reactions_do_not_hold_up_the_estimate(squeal, force):
     run = squeal(OSCILLATOR, "--set", f"force.0.vector=[0,{-force},0]", "--set", "transient.enabled=false", "--set",
                  "cycle.enabled=false", ranks=1)
     assert run.code in (0, 2), run.errors
-    assert run.report["timings"]["estimate"] < 5
+    assert run.report["processor_seconds"]["estimate"] < 5

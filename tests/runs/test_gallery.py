@@ -1,4 +1,5 @@
-"""Each small scene of a study or law ends with exit code 0 and has its number. They are those of inputs/README.md."""
+"""Each small scene of a study or law ends with exit code 0 and has its number. They are those of inputs/README.md, without
+the dynamometer, of whose kind test_front_door.py has a table."""
 
 import pytest
 from conftest import INPUTS

@@ -27,10 +27,10 @@ def test_an_installation_runs_and_plots_from_another_folder(tmp_path):
     assert ended.returncode == 2 and "exit code 2: a stage did not reach its result" in ended.stderr
     assert "abort" not in ended.stdout + ended.stderr
     word = subprocess.run([prefix / "bin" / "squeal", "plot", "results/scene", "--only", "modes", "--output", "by_word"], cwd=work,
-                          env=environment, capture_output=True, text=True, timeout=100)
+                          env=environment, capture_output=True, text=True, timeout=300)
     assert word.returncode == 0 and (work / "by_word" / "modes.png").exists(), word.stderr
     named = subprocess.run([prefix / "bin" / "squeal", "run", "oscillator", "--dry-run"], cwd=work, env=environment,
-                           capture_output=True, text=True, timeout=100)
+                           capture_output=True, text=True, timeout=300)
     assert named.returncode == 0 and "title" in named.stdout, named.stderr
     results = work / "results" / "scene"
     assert (results / "report.json").exists()

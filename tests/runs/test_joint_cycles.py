@@ -119,7 +119,7 @@ def real_values(cycle):
     return [value["real"] for value in cycle["multipliers"]["values"]]
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", [1, 2])
 def test_a_stuck_bracket_is_clamped(scene, converged, ranks):
     cycle = converged(scene(STUCK), ranks=ranks).report["cycle"]
     assert cycle["period"] == pytest.approx(5.954461004653, rel=3e-5)  # clamped, exact; these steps leave up to 2e-5
@@ -144,9 +144,8 @@ def test_shorter_steps_come_to_the_clamped_limit(scene, converged):
     assert fine == pytest.approx(5.954461004653, rel=1e-5)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_a_node_that_slips_both_ways_forgets_its_offset(scene, converged, ranks):
-    cycle = converged(scene(MICRO), ranks=ranks).report["cycle"]
+def test_a_node_that_slips_both_ways_forgets_its_offset(scene, converged):
+    cycle = converged(scene(MICRO), ranks=1).report["cycle"]
     assert cycle["period"] == pytest.approx(5.950161, rel=1e-5)
     assert cycle["mean_energy"] == pytest.approx(1.757916, rel=1e-3)
     assert cycle["mean_fluctuating_energy"] == pytest.approx(1.457592, rel=1e-3)

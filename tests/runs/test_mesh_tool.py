@@ -267,7 +267,7 @@ def test_shells_units_and_what_is_missing(squeal, tmp_path):
     assert content["force"] == [{"on": "node_2", "vector": [0, 0, 4]}]
     assert "*TEMPERATURE (line 21)" in scene.read_text()
     (tmp_path / "shell.inp").write_text(text.replace("210000., 0.3\n*DENSITY", "210000., 0.3\n*EXPANSION").replace("7.85e-9", "1e-5"))
-    scene = convert(tmp_path / "shell.inp", tmp_path / "lacks")
+    scene = convert(tmp_path / "shell.inp", tmp_path / "lacks", "--length", "1")
     assert 'density = "FILL IN [kg/m3]: the deck has none"' in scene.read_text()
     assert "density" in squeal(scene, "--dry-run", ranks=1).messages[0]
 
@@ -285,7 +285,7 @@ def test_all_that_an_input_deck_may_name(tmp_path):
         "2, 3, 1\n*NSET, NSET=Right\n6, 7\n*NSET, NSET=both\nRIGHT, 1\n*NSET, NSET=of_body, ELSET=BODY\n*NSET, NSET=ref\n99\n"
         "*SURFACE, NAME=side\nBody, S4\n*SURFACE, NAME=hull, TYPE=ELEMENT\nBODY\n*SURFACE, NAME=dots, TYPE=NODE\nRight\n"
         "*MATERIAL, NAME=Steel\n*ELASTIC, TYPE=LAMINA\n1,1,1\n*SOLID SECTION, ELSET=Body, MATERIAL=STEEL\n"
-        "*TIE, NAME=t\nside, hull\n*CONTACT PAIR, INTERACTION=i\nSkin, side\n*BOUNDARY\n1, ZSYMM\nref, 1, 6\nRight, 2, 2, 0.1\n")
+        "*TIE, NAME=t\nside, hull\n*SURFACE INTERACTION, NAME=i\n*CONTACT PAIR, INTERACTION=i\nSkin, side\n*BOUNDARY\n1, ZSYMM\nref, 1, 6\nRight, 2, 2, 0.1\n")
     model = TOOL.read_deck(tmp_path / "deck.inp")
     assert {name: {frozenset(f) for f in faces} for name, faces in model.surfaces.items() if name != "hull" and name != "of_body"} == {
         "side": {RIGHT}, "Skin": {TOP}, "Right": {RIGHT}, "dots": {RIGHT}, "both_faces": {RIGHT},
@@ -295,7 +295,7 @@ def test_all_that_an_input_deck_may_name(tmp_path):
     assert model.supports == [("node_1", ["z", "rx", "ry"], {}), ("Right", ["y"], {"displacement": [0, 0.1, 0]})]
     text = convert(tmp_path / "deck.inp", tmp_path / "out").read_text()
     for words in ('[[tie]]\nslave = "side"\nmaster = "hull"', "[[contact]]\nrotor = \"side\"\nstator = \"Skin\"\nfriction = 0\n",
-                  "1 elements of type SPRINGA", "the set ref", "fixed = \"y\"\ndisplacement = [0, 0.1, 0]",
+                  "1 element of type SPRINGA", "the set ref", "fixed = \"y\"\ndisplacement = [0, 0.1, 0]",
                   "*ELASTIC, TYPE=LAMINA", "young = \"FILL IN [Pa]: the deck has none\""):
         assert words in text, words
 
@@ -333,9 +333,8 @@ def test_the_case_control_selects_supports(tmp_path):
     model = read_text(tmp_path, "BEGIN BULK\n" + spc + BULK, "a.bdf")
     assert len(model.supports) == 3
     assert model.notes == ["a choice of supports in the case control: all are there, SPC 1, 2, 3"]
-    model = read_text(tmp_path, "SPC=1\nSUBCASE 2\nSPC=7\nBEGIN BULK\n" + spc + BULK, "a.bdf")
-    assert held(model) == {"spc_1_3": ["z"]}
-    assert "SPC 7, which the case control selects and the deck has not" in model.notes
+    with pytest.raises(TOOL.Problem, match="case control, SPC: the set '7' is not defined; known are 1, 2, 3, 9"):
+        read_text(tmp_path, "SPC=1\nSUBCASE 2\nSPC=7\nBEGIN BULK\n" + spc + BULK, "a.bdf")
 
 
 def test_rotations_that_solids_have_not_are_not_held(tmp_path):
@@ -363,7 +362,7 @@ def test_sets_of_the_case_control(tmp_path):
 
 def test_what_bulk_data_has_and_the_mesh_has_not_is_named(tmp_path):
     """Of parameters WTMASS and G are read, and loss factors of materials; a plate on a lining stays a surface."""
-    text = BULK + ("PARAM,WTMASS,1.-3\nPARAM,G,0.02\nPARAM,POST,-1\nPARAM,W3,6000.\nMAT1,7,2.1+11,,.3,7850.,,,0.01\n"
+    text = BULK + ("PARAM,WTMASS,1.-3\nPARAM,G,0.02\nPARAM,POST,-1\nPARAM,W5,6000.\nMAT1,7,2.1+11,,.3,7850.,,,0.01\n"
                    "SPC,1,1,3,0.5\nGRID,9,,2.,0.,0.\nGRID,10,,2.,1.,0.\nCQUAD4,2,20,2,9,10,3,,0.1\n,,0,1.,1.\n"
                    "PSHELL,20,7,0.1,8,2.0,8,0.833333,0.4\n"
                    "CQUAD4,3,30,5,6,7,8\nPSHELL,30,7,5.\nCGAP,4,1,1,3\nCGAP,5,2,2,3\n")
@@ -372,7 +371,7 @@ def test_what_bulk_data_has_and_the_mesh_has_not_is_named(tmp_path):
     scene = convert(tmp_path / "a.bdf", tmp_path / "out").read_text()
     assert scene.count("\nloss_factor = 0.03\n") == 2
     notes = "\n".join(model.notes)
-    for words in ("the cards CGAP (2)", "ZOFFS of 1 CQUAD4", "T1 to T4 of 1 CQUAD4", "PARAM W3",
+    for words in ("the cards CGAP (2)", "ZOFFS of 1 CQUAD4", "T1 to T4 of 1 CQUAD4", "PARAM W5",
                   "thickness 5 of PSHELL 30, whose elements lie on solids", "MID2, 12I/T**3, NSM of PSHELL 20"):
         assert words in notes, words
     assert len(model.notes) == 6 and 'fixed = "z"\ndisplacement = [0, 0, 0.5]' in scene
@@ -498,14 +497,14 @@ def test_what_an_input_deck_has_and_the_mesh_has_not_is_named(tmp_path):
                   "2 layers of *SHELL SECTION", "tie of row (slave) and Top (master): row has no faces",
                   "the surface r (line 32)", "degrees of freedom from 11 on of n",
                   "support of Skins along rx ry rz: its nodes have no rotations",
-                  "1 shells without a *SHELL SECTION", "*CONTACT PAIR (line 46), whose surface r",
-                  "1 nodes of the set n", "1 elements of the set mixed that are not there, 77 the first", "the set rod, whose elements"):
+                  "1 shell without a *SHELL SECTION",
+                  "1 node of the set n", "1 element of the set mixed that are not there, 77 the first", "the set rod, whose elements"):
         assert words in notes, words
-    assert len(model.notes) == 17
-    assert model.ties == [("side", "Top")] and model.contacts == [("side", "Top", {"friction": 0})] and held(model) == {"n": list(MOTIONS)}
+    assert len(model.notes) == 16 and model.contacts[0][0].startswith("FILL IN [a surface]: r of the deck has no faces")
+    assert model.ties == [("side", "Top")] and model.contacts[1] == ("side", "Top", {"friction": 0}) and held(model) == {"n": list(MOTIONS)}
     assert model.parts["skin"].thickness == pytest.approx(0.3, rel=1e-15) and model.parts["skin"].material == "M"
     scene = convert(tmp_path / "deck.inp", tmp_path / "out").read_text()
-    assert "loss_factor = 0.01\nbeta = 1e-07\n" in scene and "loss_frequency = \"FILL IN [Hz]" in scene
+    assert "loss_factor = 0.01\nbeta = 1e-07\n" in scene and "loss_frequency = 10000" in scene
 
 
 BAD = {

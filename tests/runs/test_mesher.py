@@ -92,7 +92,7 @@ def test_a_signal_that_ends_the_mesher_is_named(tmp_path):
     scene = brick_scene(tmp_path)
 
     def run():
-        done = subprocess.run([tmp_path / "squeal", scene, "--dry-run"], capture_output=True, text=True, timeout=100)
+        done = subprocess.run([tmp_path / "squeal", scene, "--dry-run"], capture_output=True, text=True, timeout=300)
         assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done.stderr
         return done.stderr
 

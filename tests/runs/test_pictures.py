@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from conftest import INPUTS, ROOT
 
 sys.path.insert(0, str(ROOT / "tools"))
 from squeal import plot_basis  # noqa: E402
+from squeal import plot_captions  # noqa: E402
 from squeal import plot_response  # noqa: E402
 from squeal import plot_spectra  # noqa: E402
 from squeal import surface  # noqa: E402
@@ -17,7 +19,7 @@ from matplotlib.text import Text  # noqa: E402
 
 
 def plot(*words):
-    done = subprocess.run([sys.executable, ROOT / "tools" / "plot", *map(str, words)], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, ROOT / "tools" / "plot", *map(str, words)], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -323,6 +325,40 @@ def test_ticks_of_a_logarithm_away_from_zero_keep_apart(scale, low, high):
     assert 0 in ticks and len(ticks) <= 13 and np.abs(ticks[ticks != 0]).min() >= 2 * scale
 
 
+@pytest.mark.parametrize("scale, high, tick", [(67.3, 67.3, 60), (4.2, 8.9, 8), (0.05, 0.051, 0.05)])
+def test_a_side_without_a_decade_has_a_number(scale, high, tick):
+    from squeal.plot_stability import symlog_ticks
+
+    assert max(symlog_ticks(scale, -1e4, high)) == pytest.approx(tick)
+
+
+def table_sweep(**names):
+    """Points of four numbers: two that touch and turn, one apart, one that failed."""
+    points = [{"values": [load, speed, offset], "direction": 1, "outcome": "converged", "closed": closed, "growth_rate": growth}
+              for load, speed, offset, closed, growth in ((5, 2, -1, 9, 7.0), (5, -2, 1, 9, -1.0), (-5, 2, 1, 0, -1.0))]
+    points.append({"values": [7, 0, 1], "direction": 1, "outcome": "failed", "reason": "nothing drives a pair there", "closed": 9})
+    return {"keys": ["numbers.load", "numbers.speed", "mesh.parameters.offset"], "names": ["force.0.vector.2", "rotor.0.rate", ""], "points": points}
+
+
+def test_points_where_nothing_touches_or_that_failed_are_not_quiet_ones():
+    from squeal import plot_sweep
+
+    class Swept:
+        title, folder = "matrix", Path("matrix")
+
+        def lines(self, stage):
+            return [{"numbers.load": "5", "numbers.speed": "2", "mesh.parameters.offset": "-1", "direction": "1", "growth_rate": "7", "frequency_hz": "900"}]
+
+    sweep = table_sweep()
+    figure = plot_sweep.draw_occurrence(Swept(), sweep)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels[:2] == ["speed above 0: 1 of 1 point unstable", "speed below 0: 0 of 1 point unstable"]  # not the offset, which has both signs too
+    assert figure.not_counted == ["Nothing touches at 1 point, not counted: load -5, speed 2, mesh offset 1.",
+                                  "1 point failed: load 7, speed 0, mesh offset 1 (nothing drives a pair there)."]
+    caption = plot_captions.of_sweep([], figure)
+    assert all(sentence in caption for sentence in figure.not_counted)
+
+
 def test_the_line_of_a_mode_passes_through_its_thresholds():
     from squeal import plot_sweep
 
@@ -330,16 +366,7 @@ def test_the_line_of_a_mode_passes_through_its_thresholds():
     assert x.tolist() == [0.2, 0.297, 0.3] and frequency.tolist() == [1580, 1583, 1590] and growth.tolist() == [-50, 0, 60]
 
 
-def test_a_map_grows_from_its_thresholds_and_knows_nothing_of_points_that_failed():
-    from squeal import plot_sweep
-
-    point = lambda x, growth: {"values": [x, 1], "unstable_modes": int(growth > 0), "growth_rate": growth}
-    points = [point(0, -5), point(1, 10), point(2, 20), {"values": [3, 1], "unstable_modes": 0}]
-    level = plot_sweep.level_between(points, [{"values": [0.8, 1]}], np.array([0.5, 0.8, 0.9, 1.5, 2.5]))
-    assert level == pytest.approx([0, 0, 5, 15, np.nan], nan_ok=True)
-
-
-def test_a_map_of_random_points_shows_the_planes_between_them():
+def test_a_map_of_design_points_shows_the_planes_between_them():
     """Thin triangles and numbers of units far apart included: the growth rate of a plane is met everywhere, and 0 below it."""
     from squeal import plot_sweep
 
@@ -349,35 +376,6 @@ def test_a_map_of_random_points_shows_the_planes_between_them():
     known = np.isfinite(level)
     assert 0.5 < known.mean() < 1 and level[known] == pytest.approx(np.maximum(plane(*np.meshgrid(x, y)), 0)[known], abs=1e-9)
     assert np.isnan(plot_sweep.level_within(values[:2], np.ones(2))[2]).all()  # no triangle
-
-
-def test_a_map_of_two_numbers_shows_the_motions_too():
-    """Each motion by its mark in a map of frequencies and one of energies; where none was found a cross says so."""
-    from squeal import plot_sweep
-
-    found = {"outcome": "converged", "stability": "stable", "frequency_hz": 1500.0, "mean_fluctuating_energy": 2e-6}
-    motions = [found, found | {"stability": "unstable", "mean_fluctuating_energy": 5e-5}, found | {"outcome": "settled"},
-               {"outcome": "not converged", "frequency_hz": None}]
-    points = [{"values": [k, k % 2], "direction": 1, "outcome": "converged", "unstable_modes": 1, "growth_rate": 9.0, "motion": motion}
-              for k, motion in enumerate(motions)]
-    sweep = {"points": points, "thresholds": [], "keys": ["a", "b"], "names": ["", ""], "units": ["-", "m"]}
-    figure = plot_sweep.draw_map(Driven(), sweep)
-    assert [len(axes.collections) for axes in figure.axes[1:3]] == [3, 3]
-    labels = {text.get_text() for text in figure.legends[0].get_texts()}
-    assert {"cycle, attracts", "cycle, repels", "settled motion, no cycle attracts", "no motion found: not converged"} <= labels
-    assert [axes.get_ylabel() for axes in figure.axes[-2:]] == ["frequency of the motion [kHz]", "mean energy of the motion [J]"]
-
-
-def test_random_points_of_one_number_are_drawn():
-    from squeal import plot_sweep
-
-    points = [{"values": [x], "direction": 1, "outcome": "converged", "unstable_modes": int(x > 0), "growth_rate": x, "frequency_hz": 9.0}
-              for x in (-1.0, 2.0, 1.0)] + [{"values": [0.0], "direction": -1, "outcome": "no equilibrium", "unstable_modes": 0}]
-    sweep = {"points": points, "thresholds": [], "keys": ["a"], "names": [""], "units": ["-"], "followed_modes": 0, "unstable_tracks": []}
-    figure = plot_sweep.draw_chart(Driven(), sweep)
-    assert [line.get_ydata().tolist() for line in figure.axes[2].lines[:2]] == [[-1], [2, 1]]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["least stable mode, stable", "least stable mode, unstable",
-                                                                            "point that failed: no equilibrium"]
 
 
 def test_modes_of_a_sweep_look_different():

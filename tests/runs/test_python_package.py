@@ -53,6 +53,45 @@ def test_a_scene_is_a_dict_that_is_edited_and_saved(tmp_path):
         squeal.Scene("no-such.toml")
 
 
+def test_named_numbers_stand_wherever_a_key_takes_one():
+    """In lists, with a minus and in nested tables; a text of the same name stays one."""
+    from squeal.scene import with_numbers
+
+    scene = {"numbers": {"load": 3, "disc": 5.0}, "part": [{"name": "disc", "young": "disc"}], "force": [{"on": "load", "vector": [0, 0, "-load"]}],
+             "contact": [{"rotation": {"axis": "disc", "rate": "disc"}, "factor_at_speed": [["load", 1]]}], "branch": {"from": "load"},
+             "spring": [{"from": "disc", "stiffness": "load"}], "step": [{"bolts": ["load"], "forces": ["load", 1]}], "sensitivity": {"numbers": ["load"]}}
+    assert with_numbers(scene) == {
+        "numbers": {"load": 3, "disc": 5.0}, "part": [{"name": "disc", "young": 5}], "force": [{"on": "load", "vector": [0, 0, -3]}],
+        "contact": [{"rotation": {"axis": "disc", "rate": 5}, "factor_at_speed": [[3, 1]]}], "branch": {"from": 3},
+        "spring": [{"from": "disc", "stiffness": 3}], "step": [{"bolts": ["load"], "forces": [3, 1]}], "sensitivity": {"numbers": ["load"]}}
+
+
+def test_the_keys_that_take_texts_are_known():
+    """Of the page of keys: texts, words, paths, motions and directions, for which no number stands by name."""
+    from squeal.scene import ENDS, TEXTS
+
+    rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \|[^|]*\| ?([^|]*?) ?\|", (INPUTS / "KEYS.md").read_text(), re.M)
+    plain = {key for key, unit, value in rows if unit in ("text", "texts", "word", "path", "motions") or value == "direction"}
+    assert plain - {*ENDS} == TEXTS
+    assert {key for key, unit, value in rows if unit not in ("text", "texts", "word", "path", "motions", "switch", "table") and value != "direction"} & TEXTS == set()
+
+
+def test_a_folder_that_is_not_there_is_said_to_be_none(tmp_path):
+    with pytest.raises(squeal.SquealError, match="there is no folder .*/nowhere$"):
+        squeal.Results(tmp_path / "nowhere")
+    (tmp_path / "pin_on_disc").mkdir()
+    (tmp_path / "pin_on_disc" / "report.json").write_text("{}")
+    with pytest.raises(squeal.SquealError, match="there is no folder .*; results are in .*pin_on_disc$"):
+        squeal.Results(tmp_path / "pin_on_dics")
+
+
+@pytest.mark.parametrize("frequency, words", [(0.16873, "0.1687 Hz"), (12.3456, "12.35 Hz"), (5057.23, "5057.2 Hz"), (123456, "1.235e+05 Hz")])
+def test_frequencies_keep_their_digits(frequency, words):
+    from squeal.results import Results
+
+    assert Results._answer("cycle", {"frequency_hz": frequency}) == words
+
+
 def test_places_are_the_paths_that_are_read():
     """Of the page of keys: those of existing files and folders."""
     keys = re.findall(r"^\| `(\w+)` \| path \|[^|]*\| existing", (INPUTS / "KEYS.md").read_text(), re.M)

@@ -1,4 +1,4 @@
-"""The same answer on 1, 2 and 3 ranks, to solver tolerance, on the small brake, on the pin and on two plates."""
+"""The same answer on 1 and 2 ranks, to solver tolerance, on the small brake and on the pin; on 1 to 4 ranks on two plates."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ BRAKE = [INPUTS / "tgv" / "scene.toml", "--set", "mesh.parameters.size=4000", "-
 def brakes(module_run):
     start = ["--set", "transient.enabled=true", "--set", "transient.start=mode", "--set", "transient.periods=2",
              "--set", "transient.steps_per_period=50"]
-    return [module_run(*BRAKE, *start, ranks=ranks) for ranks in (1, 2, 3)]
+    return [module_run(*BRAKE, *start, ranks=ranks) for ranks in (1, 2)]
 
 
 def test_brake_reactions(brakes):
@@ -75,7 +75,7 @@ def largest_of(cycle):
 @pytest.mark.parametrize("scene", [
     ["pin_on_disc/scene.toml", "--set", "mesh.parameters.divisions=3", "--set", "modes.band=6000", "--set",
      "modes.method=full", "--set", "fidelity=full", "--set", "cycle.tolerance=1e-10", "--set", "damping.beta=4e-7"],
-    ["oscillator/scene.toml", "--set", "cycle.tolerance=1e-10"],
+    ["oscillator/scene.toml", "--set", "cycle.tolerance=1e-10", "--set", "cycle.steps_per_period=100"],
 ], ids=["oblique", "whole"])
 def test_multipliers(scene, converged):
     """1e-6: two cycles found to 1e-10 differ by less, and the passes end when the largest has settled to 2.5e-7. The pin's

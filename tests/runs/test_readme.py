@@ -108,11 +108,6 @@ def tables(page):
         head = head and not set(line) <= set("|-")
 
 
-@pytest.fixture(scope="module")
-def helped(tmp_path_factory):
-    return Run(["-help"], 1, tmp_path_factory.mktemp("help")).printed
-
-
 @pytest.mark.parametrize("page", [KEYS, RESULTS])
 def test_pages_are_what_the_program_writes(page, tmp_path):
     """`squeal --reference keys > inputs/KEYS.md` renews the page, `--reference results` the other one."""
@@ -131,11 +126,9 @@ def test_every_key_has_a_meaning():
     assert len(rows) > 60 and all(cells[-1] for cells in rows)
 
 
-def test_every_option_is_explained(helped):
-    known = dict(re.findall(r"^  (-\w+) .* \[(.*)\]$", helped, re.M))
-    page = {cells[0]: cells[1] for heading, cells in tables(KEYS) if heading == "Options"}
+def test_every_option_is_explained():
+    known = [cells[0] for heading, cells in tables(KEYS) if heading == "Options"]
     assert 10 < len(known) <= 20
-    assert page == known
     guide = GUIDE.read_text()
     assert not [name for name in known if not re.search(rf"`[^`]*{name}\b", guide) and f" {name} " not in guide]
 
@@ -146,8 +139,8 @@ RUNS = {
                    "transient.periods=20", "--set", "transient.steps_per_period=50", "--set", "fidelity=auto",
                    "--set", "branch.key=friction.coefficient", "--set", "branch.from=0.28", "--set", "branch.to=0.32",
                    "--set", "branch.points=4", "--set", "cycle.starts=2", "--set", "sweep.key=friction.coefficient", "--set",
-                   "sweep.from=0.1", "--set", "sweep.to=0.3", "--set", "sweep.points=3", "--set", "sweep.stages=cycle", "--set",
-                   "change=[{probe='pad_y',mass=1e-3}]", "--set", "robustness.samples=10", "--set", "robustness.checks=2",
+                   "sweep.from=0.1", "--set", "sweep.to=0.3", "--set", "sweep.points=3", "--set",
+                   "change=[{probe='pad_y',mass=1e-3}]", "--set", "robustness.samples=10",
                    "--set", "uncertain=[{key='friction.coefficient', deviation=0.01}]", "--set", "response.from=0.01",
                    "--set", "response.to=1", "--set", "response.count=20", "--set",
                    "sensitivity.numbers=friction.coefficient"],
@@ -193,12 +186,9 @@ def data_sets_of(file):
 # Written with a verdict that is unstable or undecided, or by Arnoldi in place of a projection: no run here ends so.
 UNLESS_STABLE = {"cycle.multipliers.crossing", "cycle.multipliers.would_decide", "cycle.multipliers.refusal"}
 # Written of points of a sweep that fail.
-UNLESS_STABLE |= {"sweep.points[].reason", "sweep.points[].motion.reason"}
-# Written of cycle.start = "coarse", which takes longer; test_coarse_start reads them.
-UNLESS_STABLE |= {f"coarse.{key}" for key in ("dofs", "pairs", "residual", "frequency_hz", "mean_fluctuating_energy", "periods")}
-# Written of branches with events, where a stable cycle stands beside a stable equilibrium, and of reduced models, which
-# test_branch reads.
-OF_SOME_BRANCHES = re.compile(r"branch\.((events|coexistence)\[\]\.\w+|reduction\..+|points\[\]\.full_residual|not_reduced)")
+UNLESS_STABLE |= {"sweep.points[].reason"}
+# Written of branches with events, and of reduced models, which test_branch reads.
+OF_SOME_BRANCHES = re.compile(r"branch\.(events\[\]\.\w+|reduction\..+|points\[\]\.full_residual|not_reduced)")
 # Written of pairs without a drive, which test_undriven and test_joint_cycles read.
 UNLESS_STABLE |= {f"equilibrium.undriven_pairs.{key}" for key in ("stick", "slip", "open", "at_limit", "increments", "change", "index",
                                                                   "reciprocal_condition")} | {"transient.joint_work[]", "modes.dependent_rows", "estimate.slip_amplitude",

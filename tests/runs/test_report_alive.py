@@ -96,6 +96,45 @@ def test_a_rotor_drives_the_contacts_of_its_part(pin, tmp_path):
         assert count == 1 and place.radius == radius
 
 
+def test_numbers_by_name_drive_the_pictures_and_the_page(pin, tmp_path):
+    """A rate and a coefficient by name, one with a minus: the same places of the contact, and the same input on the page."""
+    shutil.copytree(pin.folder, tmp_path / "named")
+    file = tmp_path / "named" / "resolved.toml"
+    text, rates = re.subn(r"(\brate\S* = )20\b", r'\1"-speed"', file.read_text())
+    text, laws = re.subn(r"(\ncoefficient = )[\d.]+", r'\1"mu"', text)
+    file.write_text(text.replace("[mesh]", 'numbers = { "speed" = -20, "mu" = 0.3 }\n\n[mesh]', 1))
+    named = squeal.Results(tmp_path / "named")
+    assert rates == laws == 1 and [place.marks() for place in places_of(named)] == [place.marks() for place in places_of(pin)]
+    assert "20 rad/s" in report_input.input_of(named) and report_input.input_of(named) == report_input.input_of(pin)
+
+
+def test_marks_of_the_model_stand_apart_over_its_picture():
+    """The white around the model is cut, the marks move with it, and names of edges that are seen at one place keep apart."""
+    from squeal import plot_model
+
+    picture = np.full((800, 1000, 3), 255, np.uint8)
+    picture[300:500, 200:900] = 90
+    same = np.array([400.0, 450.0])
+    cut, ((centre, edges),) = plot_model.cropped(picture, [(same, {"leading": same, "trailing": same})])
+    assert cut.shape == (259, 759, 3) and centre.tolist() == [230, 180] and edges["leading"].tolist() == [230, 180]
+    figure, axes = plot_model.plt.subplots()
+    plot_model.show(axes, cut, "")
+    plot_model.draw_marks(axes, cut, [(centre, edges)])
+    figure.canvas.draw()
+    boxes = [text.get_bbox_patch().get_window_extent() for text in axes.texts]
+    assert [text.get_text() for text in axes.texts] == ["leading", "trailing"] and not boxes[0].overlaps(boxes[1])
+    assert axes.lines[0].get_color() == plot_model.RED
+
+
+def test_the_slope_of_the_mechanical_energy_is_the_sum_of_powers(pin):
+    from squeal import plot_motion
+
+    powers = plot_motion.powers_of(pin)
+    total = powers["contact_power"] - np.abs(powers["damping_power"]) + powers["load_power"]
+    steps = np.diff(powers["energy"])
+    assert steps == pytest.approx(total[1:] * np.diff(powers["time"]), abs=1e-6 * np.abs(steps).max())
+
+
 def test_a_pad_all_round_the_axis_has_no_edges_and_one_on_a_belt_has():
     angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)

@@ -98,7 +98,7 @@ def studies(tmp_path_factory):
     values = {"transient.enabled": False, "cycle.enabled": False, "sweep.key": "friction.coefficient", "sweep.from": 0.1, "sweep.to": 0.3,
               "sweep.points": 3, "sensitivity.numbers": "['friction.coefficient', 'spring.0.stiffness']",
               "change": "[{probe='pad_x', mass=0.002}, {probe='pad_x', stiffness=0.003}]", "response.from": 0.05, "response.to": 0.5,
-              "response.count": 20, "robustness.samples": 100, "robustness.checks": 2, "uncertain": "[{key='friction.coefficient', deviation=0.03}]"}
+              "response.count": 20, "robustness.samples": 100, "uncertain": "[{key='friction.coefficient', deviation=0.03}]"}
     return squeal.run(INPUTS / "oscillator", values, output=tmp_path_factory.mktemp("studies") / "run")
 
 

@@ -1,10 +1,9 @@
-"""Frequency responses of whole runs, and damping ratios that were measured."""
+"""Frequency responses of whole runs."""
 
 import h5py
 import numpy as np
 import pytest
 from conftest import INPUTS
-from scipy.optimize import nnls
 
 OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.enabled=false"]
 MATRICES = [INPUTS / "oscillator" / "matrices.toml", *OSCILLATOR[1:]]
@@ -69,48 +68,16 @@ def test_the_poles_are_the_modes(converged):
     (["response.from=1", "response.to=2", "response.count=1"], "from 2 to 100000"),
     (["response.from=1", "response.to=2", "response.count=1000000000"], "from 2 to 100000"),
     (["response.from=1", "response.to=2", "probe=[]"], "[[probe]]"),
-    (["damping.measured=[[100, 0.01]]"], "two rows"),
-    (["damping.measured=[[200, 0.01], [100, 0.01]]"], "row before"),
-    (["damping.measured=[[100, 0.01], [200, -0.01]]"], "between 0 and 1"),
-    (["damping.measured=[[100, 0.01], [200, 0.01]]", "damping.beta=1e-3"], "excludes 'measured'"),
 ])
 def test_bad_input_is_one_message(squeal, words, message):
     run = squeal(*MATRICES, *[word for pair in words for word in ("--set", pair)], ranks=1)
     assert run.code == 1 and len(run.messages) == 1 and message in run.messages[0], run.errors
 
 
-def resolved(run):
-    """alpha and beta of the scene that a run wrote out."""
-    text = (run.output / "resolved.toml").read_text().split("[damping]")[1]
-    return [float(text.split(f"{key} = ")[1].split()[0]) for key in ("alpha", "beta")]
-
-
-@pytest.mark.parametrize("word, message", [("damping.alpha=0.1", "[damping] alpha"), ("damping.beta=1e-3", "[damping] beta"),
-                                           ("damping.measured=[[0.1, 0.01], [0.4, 0.008]]", "[damping] measured")])
+@pytest.mark.parametrize("word, message", [("damping.alpha=0.1", "[damping] alpha"), ("damping.beta=1e-3", "[damping] beta")])
 def test_damping_of_parts_is_refused_without_parts(squeal, word, message):
     """Masses of points and springs carry none: it was silently without effect."""
     run = squeal(*OSCILLATOR, "--set", word, "--dry-run", ranks=1)
     assert run.code == 1 and len(run.messages) == 1, run.errors
     assert f"--set {word}: {message} has no effect" in run.messages[0] and "give each [[spring]] its damping" in run.messages[0]
 
-
-# The oscillator's frequencies are near 0.17 Hz.
-@pytest.mark.parametrize("measured", [
-    [[0.1, 0.01], [0.4, 0.008]],              # met by both
-    [[0.1, 0.002], [0.2, 0.004], [0.4, 0.008]],  # beta alone: in a line
-    [[0.1, 0.001], [0.4, 0.02]],              # alpha would be negative
-    [[0.1, 0.05], [0.4, 0.001]],              # beta would be negative
-    [[0.1, 0.01], [0.2, 0.03], [0.4, 0.005]],    # no fit: a warning
-])
-def test_measured_ratios_are_fitted(converged, measured, tmp_path):
-    run = converged(*MATRICES, "--set", f"damping.measured={measured}", ranks=1)
-    omega, ratio = 2 * np.pi * np.array(measured).T[0], np.array(measured).T[1]
-    rows = np.column_stack([1 / (2 * omega), omega / 2]) / ratio[:, None]
-    wanted, _ = nnls(rows, np.ones(len(ratio)))
-    assert resolved(run) == pytest.approx(wanted, rel=1e-12, abs=1e-14)
-    misfit = rows @ wanted
-    missed = np.maximum(misfit, 1 / misfit) > 1.5
-    warnings = run.report["model"].get("warnings", [])
-    assert sum("measured" in text for text in warnings) == missed.sum()
-    again = converged(run.output / "resolved.toml", ranks=1)  # which holds all three keys
-    assert resolved(again) == resolved(run)

@@ -6,10 +6,9 @@ import resource
 import shutil
 import signal
 import subprocess
-import time
 
 import pytest
-from conftest import INPUTS, ROOT, cores
+from conftest import INPUTS, ROOT, cores, wait_for
 
 SCENE = INPUTS / "oscillator" / "scene.toml"
 SHORT = ["--set", "transient.periods=5", "--set", "cycle.enabled=false"]
@@ -19,13 +18,6 @@ ENDLESS = ["--set", "transient.periods=1e5"]
 def start(output, *arguments, scene=SCENE):
     command = [os.environ["SQUEAL"], scene, "--output", output, *arguments]
     return subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-
-
-def wait_for(condition, seconds=20):
-    end = time.time() + seconds
-    while not condition():
-        assert time.time() < end, "it never came true"
-        time.sleep(0.02)
 
 
 @pytest.fixture
@@ -122,21 +114,6 @@ def test_a_state_may_stand_inside_the_results(converged, tmp_path):
     assert str(output / "end.state") in (output / "resolved.toml").read_text()
 
 
-@pytest.mark.parametrize("output", ["resolved.toml", "report.json", "same.state"])
-def test_no_output_falls_on_an_input(squeal, tmp_path, output):
-    """The scene file has the name of a result, or one state would be written over another."""
-    scene = tmp_path / (output if output.endswith(".toml") else "scene.toml")
-    shutil.copy(SCENE, scene)
-    arguments = ["--output", tmp_path] if output == "resolved.toml" else []
-    if output == "report.json":
-        arguments = ["--set", f"transient.save_state={tmp_path}/report.json", "--output", tmp_path]
-    if output == "same.state":
-        arguments = ["--set", f"transient.save_state={tmp_path}/a.state", "--set", f"cycle.save_state={tmp_path}/a.state"]
-    run = squeal(scene, *arguments, ranks=1)
-    assert run.code == 1 and len(run.messages) == 1, run.errors
-    assert {file.name for file in tmp_path.iterdir()} == {scene.name}
-
-
 def make_device(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     return ["--set", f"transient.save_state={tmp_path}/pipe"]
@@ -162,14 +139,8 @@ def make_foreign_partial(tmp_path):
 
 
 def make_matrices_of_a_results_name(tmp_path):
-    shutil.copytree(INPUTS / "oscillator" / "matrices", tmp_path / "out" / "reduced")
+    shutil.copytree(INPUTS / "oscillator" / "matrices", tmp_path / "out" / "checkpoint")
     return []
-
-
-def make_scene_on_matrices_of_a_results_name(tmp_path):
-    make_matrices_of_a_results_name(tmp_path)
-    (tmp_path / "out" / "options.txt").write_text("of a run")
-    return ["--set", f"matrices.folder={tmp_path}/out/reduced"]
 
 
 def make_link_to_nothing(tmp_path):
@@ -180,10 +151,7 @@ def make_link_to_nothing(tmp_path):
 REFUSED = {"a pipe": (make_device, "pipe"), "a folder of a file's name": (make_folder_of_a_file, "history.h5 is a folder"),
            "a link": (make_link, "no run has made"), "a folder of another origin": (make_foreign_partial, "no run has made"),
            "a folder of a result's name": (make_matrices_of_a_results_name, "no run has made"),
-           "matrices in a result's place": (make_scene_on_matrices_of_a_results_name, "fall on"),
-           "a link to nothing": (make_link_to_nothing, "File exists"),
-           "a log on the scene": (lambda tmp_path: ["-log_view", f":{SCENE}"], "fall on the scene"),
-           "a log on a result": (lambda tmp_path: ["-history", tmp_path / "out" / "report.json"], "report.json")}
+           "a link to nothing": (make_link_to_nothing, "File exists")}
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -193,8 +161,7 @@ def test_nothing_of_the_users_is_replaced(squeal, tmp_path, name):
     (tmp_path / "out").mkdir()
     given = make(tmp_path)
     before = sorted(tmp_path.rglob("*")), files_below(tmp_path), SCENE.read_bytes()
-    scene = SCENE.with_name("matrices.toml") if any("matrices.folder" in str(word) for word in given) else SCENE
-    run = squeal(scene, *([] if "--output" in given else ["--output", tmp_path / "out"]), *given, ranks=1)
+    run = squeal(SCENE, *([] if "--output" in given else ["--output", tmp_path / "out"]), *given, ranks=1)
     assert run.code == 1 and len(run.messages) == 1 and words in run.messages[0], run.errors
     assert before == (sorted(tmp_path.rglob("*")), files_below(tmp_path), SCENE.read_bytes())
 

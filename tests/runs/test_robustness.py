@@ -28,7 +28,7 @@ def rows_of(run):
 @pytest.fixture(scope="module")
 def friction(tmp_path_factory):
     from conftest import Run
-    run = Run([*OSCILLATOR, *random(FRICTION, samples=400, checks=10)], 1, tmp_path_factory.mktemp("friction"))
+    run = Run([*OSCILLATOR, *random(FRICTION, samples=400)], 1, tmp_path_factory.mktemp("friction"))
     assert run.code == 0, run.printed[-2000:] + run.errors[-2000:]
     return run
 
@@ -50,18 +50,16 @@ def test_the_interval_holds_the_exact_probability(friction):
     assert number["rank_correlation"] > 0.9
 
 
-def test_the_checks_agree(friction):
+def test_samples_are_closed(friction):
     """The oscillator has three shapes: the basis holds them all, and only rounding is left."""
-    robustness = friction.report["robustness"]
-    assert robustness["wrong_verdicts"] == 0 and robustness["growth_error"] < 1e-9 and len(robustness["checks"]) == 10
+    assert friction.report["robustness"]["residual"] < 1e-9
 
 
 def test_a_skewed_number_is_taken_as_it_is(converged):
     """Its median less half its spread is below zero, where no sample lies."""
     spring = "{key='spring.2.stiffness', distribution='lognormal', mean=0.2, deviation=0.15}"
-    run = converged(*OSCILLATOR, *random(FRICTION, spring, samples=100, checks=10), ranks=1)
-    robustness = run.report["robustness"]
-    assert robustness["wrong_verdicts"] == 0 and robustness["growth_error"] < 1e-9
+    run = converged(*OSCILLATOR, *random(FRICTION, spring, samples=100), ranks=1)
+    assert run.report["robustness"]["residual"] < 1e-9 and "failed" not in run.printed
 
 
 POINTS = """title = "a pad on a caliper, on a disc"
@@ -96,7 +94,7 @@ def test_a_mode_keeps_its_number_where_shapes_alone_do_not_tell(converged, tmp_p
                "{key='contact.0.compliance', distribution='uniform', from=1e-9, to=8e-9}",
                "{key='contact.0.velocity.0', distribution='uniform', from=0.5, to=3}",
                "{key='spring.2.stiffness', distribution='lognormal', deviation=1e6}"]
-    run = converged(scene, *random(*numbers, samples=1000, checks=5), ranks=1)
+    run = converged(scene, *random(*numbers, samples=1000), ranks=1)
     modes = run.report["robustness"]["modes"]
     assert sum(mode["unstable_samples"] for mode in modes) > 100
     for mode in modes:
@@ -109,37 +107,32 @@ def test_files_hold_the_same(friction):
 
 
 def test_samples_of_the_pin_are_single_runs(converged):
-    """Friction, moduli, a density, a load, a rate and damping at once: growth within 1e-3 of |lambda|, as it is asked for."""
+    """Friction, moduli, a density, a load, a rate and damping at once: the most unstable sample and the most stable one."""
     numbers = [FRICTION.replace("0.3", "0.5"), "{key='part.pin.young', distribution='lognormal', deviation=2.5e8}",
                "{key='part.disc.density', deviation=200}", "{key='damping.beta', deviation=1e-8}",
                "{key='contact.0.rotation.rate', deviation=1}"]
-    run = converged(*PIN, *random(*numbers, samples=30, checks=12), ranks=1)
-    robustness = run.report["robustness"]
-    assert robustness["growth_error"] < 1e-3
-    # 1e-4 of |lambda| is a twentieth of the growth: a mode that close to 0 in one of the 12 may fall on either side
-    counts = [abs(check["unstable_modes"] - check["unstable_modes_reduced"]) for check in robustness["checks"]]
-    assert sum(counts) == robustness["wrong_verdicts"] <= 1
-    assert all(check["known"] for check in robustness["checks"])
-    assert any(check["unstable_modes"] > 0 for check in robustness["checks"])
-    # a sample whose growth is beyond that error
-    row = next(row for row in rows_of(run)
-               if abs(float(row["growth_rate"])) > 2 * robustness["growth_error"] * 2 * np.pi * float(row["frequency_hz"]))
-    rate = row["contact.0.rotation.rate"]
-    single = converged(*PIN, *[word for key, value in row.items() if "." in key and "rotation" not in key
-                               for word in ("--set", f"{key}={value}")],
-                       "--set", f"contact.0.rotation={{axis='z', rate={rate}}}", ranks=1).report["modes"]
-    assert single["unstable_count"] == int(row["unstable_modes"])
+    run = converged(*PIN, *random(*numbers, samples=30), ranks=1)
+    rows = sorted(rows_of(run), key=lambda row: float(row["growth_rate"]) / float(row["frequency_hz"]))
+    assert int(rows[-1]["unstable_modes"]) > 0
+    for row in (rows[0], rows[-1]):
+        rate = row["contact.0.rotation.rate"]
+        single = converged(*PIN, *[word for key, value in row.items() if "." in key and "rotation" not in key
+                                   for word in ("--set", f"{key}={value}")],
+                           "--set", f"contact.0.rotation={{axis='z', rate={rate}}}", ranks=1).report["modes"]
+        assert single["unstable_count"] == int(row["unstable_modes"])
+        worst = max(single["modes"], key=lambda mode: mode["growth_rate"] / mode["frequency_hz"])
+        assert abs(worst["growth_rate"] - float(row["growth_rate"])) < 1e-6 * 2 * np.pi * worst["frequency_hz"]
 
 
 def test_ranks_and_seeds(friction, squeal):
-    two = squeal(*OSCILLATOR, *random(FRICTION, samples=400, checks=10), ranks=2)
+    two = squeal(*OSCILLATOR, *random(FRICTION, samples=400), ranks=2)
     assert two.code == 0
     first, second = rows_of(friction), rows_of(two)
     # each sample starts from the closed pairs of another one: only rounding differs
     assert np.allclose([float(row["growth_rate"]) for row in first], [float(row["growth_rate"]) for row in second],
                        rtol=1e-9, atol=1e-9)
     assert two.report["robustness"]["any"] == friction.report["robustness"]["any"]
-    other = squeal(*OSCILLATOR, *random(FRICTION, samples=400, checks=0, seed=2), ranks=1)
+    other = squeal(*OSCILLATOR, *random(FRICTION, samples=400, seed=2), ranks=1)
     assert rows_of(other)[0] != first[0]
 
 
@@ -148,7 +141,7 @@ def test_distributions_have_their_moments(converged):
     quotation marks, and stands in the table as it was given."""
     run = converged(*OSCILLATOR, *random("{key='friction.coefficient', deviation=0.03}",
                                          "{key='point.\"pad\".mass', distribution='lognormal', deviation=0.3}",
-                                         samples=2000, checks=0), ranks=1)
+                                         samples=2000), ranks=1)
     rows = rows_of(run)
     for key, mean, deviation in (("friction.coefficient", 0.3, 0.03), ('point."pad".mass', 1.0, 0.3)):
         values = np.array([float(row[key]) for row in rows])
@@ -166,7 +159,6 @@ def test_distributions_have_their_moments(converged):
     (random("{key='friction.coefficient', deviation=0.2}", samples=10), "4 deviations from its middle; a smaller deviation"),
     (random("{key='friction.coefficient', deviation=0.1, from=0.1}", samples=10), "not from and to"),
     (random(FRICTION, FRICTION, samples=10), "twice"),
-    (random(FRICTION, samples=10, checks=11), "at most as many"),
     (random(FRICTION, samples=10, confidence=1), "between 0 and 1"),
 ])
 def test_bad_input(ask, message, squeal):
@@ -177,21 +169,23 @@ def test_bad_input(ask, message, squeal):
 def test_numbers_that_move_the_contact(converged):
     """The direction of sliding turns, and the rows of contact with it."""
     run = converged(*PIN, "--set", "friction.coefficient=0.4",
-                    *random("{key='contact.0.rotation.centre.0', distribution='uniform', from=-0.03, to=0.03}",
-                            samples=6, checks=6), ranks=1)
-    robustness = run.report["robustness"]
-    assert robustness["growth_error"] < 1e-3 and robustness["wrong_verdicts"] == 0
+                    *random("{key='contact.0.rotation.centre.0', distribution='uniform', from=-0.03, to=0.03}", samples=6), ranks=1)
+    row = rows_of(run)[-1]
+    single = converged(*PIN, "--set", "friction.coefficient=0.4", "--set",
+                       f"contact.0.rotation={{axis='z', rate=20, centre=[{row['contact.0.rotation.centre.0']},0,0]}}", ranks=1)
+    worst = max(single.report["modes"]["modes"], key=lambda mode: mode["growth_rate"] / mode["frequency_hz"])
+    assert abs(worst["growth_rate"] - float(row["growth_rate"])) < 1e-6 * 2 * np.pi * worst["frequency_hz"]
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_the_first_sample_that_fails_says_why(ranks, squeal):
     """Turned round, friction presses the pad on: beyond D_nn/D_nt = 2.87/0.185 = 15.5 there is no equilibrium."""
     run = squeal(*OSCILLATOR, "--set", "contact.0.velocity=[-0.6,0,0]",
-                 *random("{key='friction.coefficient', distribution='uniform', from=0.1, to=20}", samples=40, checks=0), ranks=ranks)
+                 *random("{key='friction.coefficient', distribution='uniform', from=0.1, to=20}", samples=40), ranks=ranks)
     failed = [number for number, row in enumerate(rows_of(run)) if row["known"] == "0"]
     assert failed == [number for number, row in enumerate(rows_of(run)) if float(row["friction.coefficient"]) > 15.5]
-    words = f"{len(failed)} of 40 samples and 0 of 0 checks failed, the first at sample {failed[0]}: no equilibrium: "
-    assert run.code == 2 and run.report["robustness"]["reason"].startswith(words)
+    words = f"{len(failed)} of 41 points failed, the first at friction.coefficient = "
+    assert run.code == 2 and run.report["robustness"]["reason"].startswith(words) and "no equilibrium: " in run.errors + run.printed
 
 
 def test_picture(friction, tmp_path):

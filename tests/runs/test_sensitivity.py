@@ -20,13 +20,13 @@ SCENES = {"oscillator": OSCILLATOR, "pin": PIN, "heavy holder": HEAVY, "lossy pi
 # Numbers whose derivatives are held against differences: of a size, and zero or next to it in the scene.
 SIZED = {
     "oscillator": ["friction.coefficient", "spring.0.stiffness", "spring.0.damping", "point.pad.mass", "point.disc.mass"],
-    "pin": ["friction.coefficient", "part.pin.young", "part.disc.young", "part.pin.density", "damping.beta",
-            "rigid_body.holder.mass", "spring.0.stiffness", "contact.0.rotation.rate", "part.pin.poisson"],
+    "pin": ["friction.coefficient", "part.pin.young", "part.pin.density", "damping.beta", "rigid_body.holder.mass",
+            "contact.0.rotation.rate", "part.pin.poisson"],
     "falling friction": ["friction.coefficient", "friction.static_coefficient", "friction.decay_speed", "contact.0.velocity.1",
                          "contact.1.velocity.0", "force.0.vector.2"],
     "compliant pads": ["friction.coefficient", "contact.0.compliance", "spring.3.stiffness", "force.0.vector.2"],
-    "lossy pin": ["part.pin.loss_factor", "part.pin.young", "friction.coefficient"],
-    "spinning disc": ["part.disc.rotation.rate", "part.disc.density"],
+    "lossy pin": ["part.pin.loss_factor", "part.pin.young"],
+    "spinning disc": ["part.disc.rotation.rate"],
 }
 ZEROS = [
     ("pin", "part.pin.loss_factor", 1e-5, ["damping.loss_frequency=5000"]),

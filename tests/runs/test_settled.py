@@ -12,8 +12,9 @@ OSCILLATOR = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=
 PERIOD, ENERGY = 5.954461004653, 1.77650678461  # exact, at V = 0.6
 
 
-@pytest.mark.parametrize("steps", [50, 100, 200, 400, 800, 1600])
-@pytest.mark.parametrize("mu, speed", [(0.3, 0.3), (0.3, 0.6), (0.3, 1), (0.3, 2), (0.25, 10), (0.9, 1)])
+# each scene with few steps and with many
+@pytest.mark.parametrize("mu, speed, steps", [(0.3, 0.3, 50), (0.3, 0.3, 400), (0.3, 0.6, 100), (0.3, 0.6, 1600), (0.3, 1, 200), (0.3, 2, 50),
+                                              (0.3, 2, 800), (0.25, 10, 50), (0.25, 10, 400), (0.9, 1, 100), (0.9, 1, 800)])
 def test_every_oscillator_reaches_its_cycle_from_the_default_start(converged, steps, mu, speed):
     cycle = converged(*OSCILLATOR, "--set", f"cycle.steps_per_period={steps}", "--set", f"friction.coefficient={mu}", "--set",
                       f"contact.0.velocity=[{float(speed)},0,0]", ranks=1).report["cycle"]
@@ -44,8 +45,7 @@ damping = 0.02
     return [folder / "scene.toml", "--set", "transient.enabled=false"]
 
 
-@pytest.mark.parametrize("steps", [50, 200, 400, 1600])
-@pytest.mark.parametrize("mass", [0.01, 0.05])
+@pytest.mark.parametrize("mass, steps", [(0.01, 50), (0.01, 400), (0.05, 200), (0.05, 1600)])
 def test_an_impacting_foot_keeps_no_oscillator_from_its_cycle(squeal, tmp_path, mass, steps):
     run = squeal(*with_foot(tmp_path, mass, 3), "--set", f"cycle.steps_per_period={steps}", ranks=1)
     cycle = run.report["cycle"]
@@ -70,7 +70,7 @@ def drum_brake(folder, stiffness):
                        friction={"coefficient": 0.3}, modes={"band": 3.0}, cycle={"steps_per_period": 800, "tolerance": 1e-6})
 
 
-@pytest.mark.parametrize("stiffness, ratio, ranks", [(0.3, 0.026, 1), (1.0, 0.073, 1), (3.0, 0.110, 1), (3.0, 0.110, 2)])
+@pytest.mark.parametrize("stiffness, ratio, ranks", [(0.3, 0.026, 1), (3.0, 0.110, 1), (1.0, 0.073, 2)])
 def test_massless_feet_and_strong_growth_lead_to_a_cycle(converged, tmp_path, stiffness, ratio, ranks):
     """8 degrees of freedom, six of them without mass; the equilibrium grows by up to 11 % of the frequency a radian."""
     report = converged(drum_brake(tmp_path, stiffness), ranks=ranks).report
@@ -79,7 +79,7 @@ def test_massless_feet_and_strong_growth_lead_to_a_cycle(converged, tmp_path, st
     assert cycle["outcome"] == "converged" and cycle["periods_integrated"] <= 60
 
 
-@pytest.mark.parametrize("stiffness", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("stiffness", [0.3, 3.0])
 def test_velocities_without_mass_have_no_multipliers(converged, tmp_path, stiffness):
     """At theta = 1/2 the step keeps them with factors of 1 in modulus, at 0.55 it damps them away. What the structure itself
     has agrees within the bars and 0.01, as that theta also damps 0.05 (omega h)^2/h of the motion."""
@@ -237,10 +237,10 @@ def test_bars_of_multipliers_hold_what_impacts_within_a_step_change(squeal, tmp_
     assert abs(abs(complex(largest["real"], largest["imaginary"])) - 0.958) <= largest["error"]
 
 
-@pytest.mark.parametrize("steps", [100, 283, 400])
+@pytest.mark.parametrize("steps", [100, 400])
 def test_bars_where_pairs_stick_are_no_wider_than_the_grids_differ(converged, tmp_path, steps):
     """The largest multiplier, of a complex pair, is 0.8837 at 3201 and 6401 steps a period. That of the shift in time misses 1 by
-    3e-2, 3e-2 and 1e-2. The pair is off by 3.4e-3, 3.2e-3 and 6e-4, and bars may be five times as wide and 1e-3."""
+    3e-2 and 1e-2. The pair is off by 3.4e-3 and 6e-4, and bars may be five times as wide and 1e-3."""
     cycle = converged(sticking_slider(tmp_path, {"coefficient": 2.887202266}, cycle={"steps_per_period": steps, "start": "mode",
                                                                                   "amplitude": 1.3}), ranks=1).report["cycle"]
     largest = cycle["multipliers"]["values"][0]

@@ -118,7 +118,7 @@ def test_a_run_that_does_not_converge_is_no_failure(slurm, submit, tmp_path):
 def test_the_time_limit_queues_a_job_again_which_goes_on(slurm, limited):
     """Slurm's signal comes up to a minute early. A cancelled job ends in order as well, and is not queued again."""
     folder, number = limited
-    one_node.wait_for(lambda: slurm.job(number)["Restarts"] == "1", 60, lambda: str(slurm.job(number)))
+    one_node.wait_for(lambda: slurm.job(number)["Restarts"] == "1", 300, lambda: str(slurm.job(number)))
     assert not processes_of(folder)
     report = report_of(folder / "estimate")
     assert report["exit_code"] == 3 and report["transient"]["outcome"] == "interrupted"
@@ -126,11 +126,11 @@ def test_the_time_limit_queues_a_job_again_which_goes_on(slurm, limited):
     time.sleep(5)  # the credential of the ended start is revoked meanwhile
     slurm.command("scontrol", "update", f"jobid={number}", "starttime=now", "timelimit=60")
     job = slurm.wait_for_state(number, ("RUNNING",))
-    one_node.wait_for(lambda: printed(job).count("goes on from the checkpoint") == 1, 30, lambda: printed(job)[-2000:])
+    one_node.wait_for(lambda: printed(job).count("goes on from the checkpoint") == 1, 300, lambda: printed(job)[-2000:])
     assert printed(job).count("ended by SIGUSR1: results so far") == 1  # the log goes on
     slurm.command("scancel", number)
     assert slurm.ended(number)["JobState"] == "CANCELLED"
-    one_node.wait_for(lambda: not processes_of(folder), 20, lambda: str(processes_of(folder)))
+    one_node.wait_for(lambda: not processes_of(folder), 300, lambda: str(processes_of(folder)))
     report = report_of(folder / "estimate")
     assert report["exit_code"] == 3 and report["transient"]["steps"] > steps
     assert (folder / "estimate" / "checkpoint" / "transient").exists() and not (folder / "mode").exists()

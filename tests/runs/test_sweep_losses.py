@@ -27,15 +27,11 @@ def set_to(key, value):
 
 
 @pytest.mark.parametrize("scene, key, values, ranks", [
-    (LOSSY, "part.pin.loss_factor", [0.0, 0.2, 0.6], [2]),
-    (LOSSY, "friction.coefficient", [0.1, 0.4], [1]),
-    (SOFT, "contact.0.compliance", [0.0, 2e-13, 1e-12], [2]),
-    (SOFT, "friction.coefficient", [0.1, 0.4], [1]),
-    ([*SPINNING, "--set", "friction.coefficient=0.1"], "part.disc.rotation.rate", [0.0, 200.0, 500.0], [2]),
-    (SPINNING, "friction.coefficient", [0.3, 0.4], [1]),
+    (LOSSY, "part.pin.loss_factor", [0.0, 0.6], [2]),
+    (SOFT, "contact.0.compliance", [0.0, 1e-12], [2]),
+    ([*SPINNING, "--set", "friction.coefficient=0.1"], "part.disc.rotation.rate", [0.0, 500.0], [2]),
     (ALL, "friction.coefficient", [0.3, 0.4], [1, 2]),
-], ids=["loss factor", "friction with losses", "compliance", "friction with compliance", "rate", "friction with spin",
-        "friction with all"])
+], ids=["loss factor", "compliance", "rate", "friction with all"])
 def test_points_are_single_runs(scene, key, values, ranks, converged):
     """Values of what spins have no threshold between them, whose search would take nine tenths of the time."""
     sweeps = [converged(*scene, "--set", f"sweep.key={key}", "--set", f"sweep.values={values}", ranks=n) for n in ranks]
@@ -68,10 +64,9 @@ def test_modes_that_losses_merge_on_the_first_basis_are_two_on_a_better_one(conv
 
 
 def test_losses_as_large_as_the_stiffness(converged):
-    run = converged(*LOSSY, "--set", "sweep.key=part.pin.loss_factor", "--set", "sweep.values=[0.8, 1.6]", ranks=1)
-    for eta in (0.8, 1.6):
-        single = converged(*LOSSY, "--set", f"part.pin.loss_factor={eta}", ranks=1).report
-        same_modes(modes_at(rows_of(run.output), eta, key="part.pin.loss_factor"), lambdas(single), 1e-9)
+    run = converged(*LOSSY, "--set", "sweep.key=part.pin.loss_factor", "--set", "sweep.values=[1.6]", ranks=1)
+    single = converged(*LOSSY, "--set", "part.pin.loss_factor=1.6", ranks=1).report
+    same_modes(modes_at(rows_of(run.output), 1.6, key="part.pin.loss_factor"), lambdas(single), 1e-9)
 
 
 def test_the_other_direction_turns_parts_that_spin_round(converged):
@@ -149,17 +144,11 @@ FRICTION = "{key='friction.coefficient', distribution='uniform', from=0.3, to=0.
 
 @pytest.mark.parametrize("scene, numbers", [
     (LOSSY, [LOSSES, FRICTION, "{key='part.pin.young', deviation=2e8}"]),
-    (SOFT, [COMPLIANCE, FRICTION]),
-    (SPINNING, [RATE, FRICTION]),
     (ALL, [LOSSES, COMPLIANCE, RATE, FRICTION]),
-], ids=["losses", "compliance", "spin", "all"])
+], ids=["losses", "all"])
 def test_random_numbers_are_single_runs(scene, numbers, converged):
-    """Growth within 1e-3 of |lambda|, as it is asked for; the losses move it by up to a hundredth."""
-    run = converged(*scene, *random(*numbers, samples=8, checks=4), ranks=1)
-    robustness = run.report["robustness"]
-    assert robustness["growth_error"] < 1e-3
-    assert all(check["known"] for check in robustness["checks"])
-    assert any(check["unstable_modes"] > 0 for check in robustness["checks"])
+    """Growth within 1e-3 of |lambda|; the losses move it by up to a hundredth."""
+    run = converged(*scene, *random(*numbers, samples=8), ranks=1)
     row = max(samples_of(run), key=lambda row: float(row["growth_rate"]))
     changes = [word for key, value in row.items() if "." in key for word in set_to(key, float(value))]
     single = lambdas(converged(*scene, *changes, ranks=1).report)
@@ -169,7 +158,9 @@ def test_random_numbers_are_single_runs(scene, numbers, converged):
 
 def test_a_number_may_bring_what_the_medians_lack(converged):
     """At the median nothing spins."""
-    run = converged(*SPINNING, *random("{key='part.disc.rotation.rate', distribution='uniform', from=-100, to=100}", samples=4,
-                                       checks=4), ranks=1)
-    robustness = run.report["robustness"]
-    assert robustness["growth_error"] < 1e-3 and robustness["wrong_verdicts"] == 0
+    run = converged(*SPINNING, *random("{key='part.disc.rotation.rate', distribution='uniform', from=-100, to=100}", samples=4),
+                    ranks=1)
+    for row in samples_of(run):
+        single = converged(*SPINNING, *set_to("part.disc.rotation.rate", float(row["part.disc.rotation.rate"])), ranks=1).report
+        found = complex(float(row["growth_rate"]), 2 * np.pi * float(row["frequency_hz"]))
+        assert min(abs(one - found) for one in lambdas(single)) < 1e-4 * abs(found)

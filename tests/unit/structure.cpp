@@ -298,74 +298,24 @@ Coupled coupled_parts()
   return c;
 }
 
-/// As a run has it: all on rank 0, pieces elsewhere.
-MeshPiece in_pieces(const Coupled& c)
+TEST_CASE("the matrices are allocated exactly, and an element that is inside out is named")
 {
-  MeshPiece piece;
-  const auto number = [&]
-  {
-    const Partition partition = partition_mesh(c.mesh, {}, ranks_of(world));
-    piece = {c.mesh, partition, number_dofs(c.mesh, c.scene, partition, world)};
-  };
-  on_rank_zero(world, number);
-  distribute(piece, world);
-  return piece;
-}
-
-double distance_between(Mat A, Mat B)
-{
-  Owned<Mat> difference = copy_of(A);
-  check(MatAXPY(difference, -1, B, DIFFERENT_NONZERO_PATTERN));
-  return norm_of(difference) / norm_of(A);
-}
-
-TEST_CASE("ranks that have pieces of a mesh make the matrices of ranks that have all of it")
-{
-  const Coupled c = coupled_parts();
-  const Built whole = build(c.mesh, c.scene, world);
-  const MeshPiece piece = in_pieces(c);
-  const Structure structure = assemble(piece, c.scene, world);
-  for (Mat A : {structure.M.get(), structure.C.get(), structure.K.get()})
+  Coupled c = coupled_parts();
+  const Built built = build(c.mesh, c.scene, world);
+  for (Mat A : {built.structure.M.get(), built.structure.C.get(), built.structure.K.get()})
   {
     MatInfo info;
     check(MatGetInfo(A, MAT_LOCAL, &info));
     CHECK(info.mallocs == 0);
     CHECK(info.nz_used == info.nz_allocated);
   }
-  CHECK(piece.dofs.first == whole.dofs.first);
-  CHECK(piece.dofs.last == whole.dofs.last);
-  CHECK(structure.elements == static_cast<std::int64_t>(c.mesh.elements.size()));
-  CHECK(structure.names.nodal_dof == whole.structure.names.nodal_dof);
-  CHECK(describe(structure.names, piece.dofs.size - 1, world) == describe(whole.dofs.names, whole.dofs.size - 1));
-  constexpr double order_of_sums = 1e-15;
-  CHECK(distance_between(whole.structure.M, structure.M) < order_of_sums);
-  CHECK(distance_between(whole.structure.C, structure.C) < order_of_sums);
-  CHECK(distance_between(whole.structure.K, structure.K) < order_of_sums);
-  const Owned<Vec> load = copy_of(whole.structure.load);
-  check(VecAXPY(load, -1, structure.load));
-  double difference = 0;
-  check(VecNorm(load, NORM_INFINITY, &difference));
-  CHECK(difference == 0); // all of it is rank 0's
-  const std::vector<Probe> probes{{"tip", "strip:end", Vec3{1.3, 0.2, 0.2}, {0, 0.6, 0.8}}, {"end", "weight", {}, {1}}};
-  const auto P = probe_rows(probes, piece.mesh, piece.dofs, world);
-  CHECK(distance_between(probe_rows(probes, c.mesh, whole.dofs, world), P) == 0);
-  if (rank_of(world) == 0) return;
-  CHECK(piece.mesh.elements.size() < c.mesh.elements.size());
-  CHECK(piece.mesh.nodes.size() < c.mesh.nodes.size());
-  CHECK(piece.dofs.terms.size() < whole.dofs.terms.size());
-  CHECK(piece.mesh.node_groups.empty());
-}
-
-TEST_CASE("an element that is inside out is named by its number in the whole mesh")
-{
-  Coupled c = coupled_parts();
+  CHECK(built.structure.elements == static_cast<std::int64_t>(c.mesh.elements.size()));
   const std::vector<int> owners = partition_mesh(c.mesh, {}, ranks_of(world)).element_rank;
-  const auto last = std::ranges::find(owners, ranks_of(world) - 1) - owners.begin(); // known to its piece alone
+  const auto last = std::ranges::find(owners, ranks_of(world) - 1) - owners.begin(); // assembled by the last rank alone
   auto& nodes = c.mesh.elements[static_cast<std::size_t>(last)].nodes;
   std::swap(nodes[1], nodes[3]);
   const std::string named = "element " + std::to_string(last) + " with node " + std::to_string(nodes[0]) + " at";
-  const MeshPiece piece = in_pieces(c);
-  CHECK_THROWS_WITH_AS(assemble(piece, c.scene, world), doctest::Contains(named.c_str()), Error);
+  CHECK_THROWS_WITH_AS(build(c.mesh, c.scene, world), doctest::Contains(named.c_str()), Error);
 }
 
 TEST_CASE("rows of a matrix scene are read, pushed and held by row and by node")

@@ -25,19 +25,6 @@ Mesh cube_and_strip(int cells)
   return mesh;
 }
 
-/// The same with a strip of its own nodes, three cells on two of the cube's, whose edge is `gap` away and tied.
-Mesh cube_and_tied_strip(int cells, double gap)
-{
-  Mesh mesh, strip;
-  add_box(mesh, "cube", 0, {0, 0, -0.05}, {0.1, 0.1, 0.05}, {cells, cells, cells});
-  add_strip(strip, "strip", 1, {{0.1 + length, 0, 0}, {gap - length, 0, 0}, {0, width, 0}, 2 * cells, 3 * cells / 2});
-  strip.node_groups["edge"] = std::exchange(strip.node_groups["strip:end"], {});
-  add_to_group(strip, "strip:end",
-               std::array{node_at(strip, {0.1 + length, 0, 0}), node_at(strip, {0.1 + length, width, 0})});
-  append(mesh, strip);
-  return mesh;
-}
-
 Scene two_parts()
 {
   Scene scene;
@@ -124,10 +111,8 @@ TEST_CASE("a shell on a solid, with a rigid cap and a spring, has six motions wi
   check_free_of_energy(mesh, scene);
 }
 
-TEST_CASE("a shell tied to a solid by its edge or its face has six motions without energy, and a gap between them too")
+TEST_CASE("a shell tied to a solid by its face has six motions without energy, and a gap between them too")
 {
-  check_free_of_energy(cube_and_tied_strip(2, 0), tied_parts({"edge", "cube:x+", 0}));
-  check_free_of_energy(cube_and_tied_strip(2, 0.003), tied_parts({"edge", "cube:x+", 0.004}));
   check_free_of_energy(beam_and_skin(0.04, 0.01), tied_parts({"strip", "cube:z+", 0.006}));
 }
 
@@ -158,26 +143,25 @@ TEST_CASE("the rotation of a shared node is the solid's: exact where the solid t
 
 TEST_CASE("a cantilever strip on a cube bends like a clamped beam")
 {
-  // Measured: 0.9989 and 0.9971 of the beam with 2 cells, 0.9996 and 0.9983 with 4.
+  // Deflection and rotation are 0.9989 and 0.9971 of the beam's with 2 cells, 0.9996 and 0.9983 with 4.
   // Beam: deflection F L^3/(3 E I), rotation F L^2/(2 E I); a joint that let moments slip would be a hinge, and K
   // singular.
   const double inertia = width * thickness * thickness * thickness / 12, force = 10;
   const double deflection = force * std::pow(length, 3) / (3 * young * inertia);
   const double rotation = force * length * length / (2 * young * inertia);
-  for (const bool tied : {false, true})
-    for (const int cells : {2, 4})
-    {
-      Scene scene = tied ? tied_parts({"edge", "cube:x+", 0}) : two_parts();
-      scene.supports = {{"cube:x-", all}};
-      scene.forces = {{"strip:end", {0, 0, force}}};
-      const Mesh mesh = tied ? cube_and_tied_strip(cells, 0) : cube_and_strip(cells);
-      const auto built = build(mesh, scene, world);
-      const auto u = static_solution(built.structure);
-      const double w = motion_at(mesh, built, u, {0.1 + length, 0, 0}, 2) / deflection;
-      const double ry = -motion_at(mesh, built, u, {0.1 + length, 0, 0}, 4) / rotation;
-      CHECK(w == doctest::Approx(1).epsilon(0.01));
-      CHECK(ry == doctest::Approx(1).epsilon(0.01));
-    }
+  for (const int cells : {2, 4})
+  {
+    Scene scene = two_parts();
+    scene.supports = {{"cube:x-", all}};
+    scene.forces = {{"strip:end", {0, 0, force}}};
+    const Mesh mesh = cube_and_strip(cells);
+    const auto built = build(mesh, scene, world);
+    const auto u = static_solution(built.structure);
+    const double w = motion_at(mesh, built, u, {0.1 + length, 0, 0}, 2) / deflection;
+    const double ry = -motion_at(mesh, built, u, {0.1 + length, 0, 0}, 4) / rotation;
+    CHECK(w == doctest::Approx(1).epsilon(0.01));
+    CHECK(ry == doctest::Approx(1).epsilon(0.01));
+  }
 }
 
 TEST_CASE("a beam with a tied skin bends like one of both heights")

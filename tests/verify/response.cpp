@@ -1,5 +1,5 @@
 /// Frequency responses against dense algebra (src/README.md, section 13).
-// ranks: 1 2 3
+// ranks: 1 2
 #include "squeal/study/response.hpp"
 #include "../support/linearised.hpp"
 #include "../support/sliding_oscillator.hpp"

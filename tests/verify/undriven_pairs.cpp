@@ -1,4 +1,4 @@
-// ranks: 1 2 3
+// ranks: 1 2
 // Contacts without a drive in time, at rest and in modes, against exact answers.
 #include "../support/linearised.hpp"
 #include "../support/temporary_folder.hpp"

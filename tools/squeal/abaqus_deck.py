@@ -1,16 +1,18 @@
 """Decks of Abaqus and CalculiX to a mesh_model.Model: nodes, elements, sets, surfaces and supports; other keywords by the
 handlers of their modules."""
 
+import difflib
 import re
 
 import numpy as np
 
+from squeal.common import counted
 from squeal import abaqus_joining
 from squeal import abaqus_steps
 from squeal.abaqus_nodes import abaqus_nodes, made_explicit
 from squeal.abaqus_parts import flattened
 from squeal.abaqus_properties import frame_of, read_materials, read_sections
-from squeal.deck_files import Problem, blocks_of, number, whole
+from squeal.deck_files import Problem, blocks_of, number, undefined, whole
 from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model
 
 SOLIDS = {"4": "tet4", "6": "wedge6", "8": "hex8", "10": "tet10", "20": "hex20"}
@@ -58,7 +60,7 @@ class Sets:
 
     def get(self, name, place, what):
         if name.upper() not in self.items:
-            raise Problem(f"{place}: {what} '{name}' is not defined above; known are {', '.join(self.names.values()) or 'none'}")
+            raise undefined(place, what, name, self.names.values())
         return self.items[name.upper()]
 
 
@@ -82,6 +84,7 @@ class Deck:
         self.coupling = None  # node, surface and block of the last *COUPLING
         self.pretension, self.tension, self.beams = {}, {}, {}  # by node, by node, by element
         self.used = set()  # nodes of elements
+        self.bare_surfaces = {}  # that are defined and have no faces of elements: their names by their own in capitals
 
     def line_of(self, place):
         file, _, line = place.rpartition(", ")
@@ -91,7 +94,22 @@ class Deck:
         self.model.notes.append(f"{what} ({self.line_of(place)})")
 
     def nodes_of(self, text, place):
-        return [int(text)] if text.isdecimal() else self.nodes.get(text, place, "the node set")
+        if text.isdecimal():
+            if int(text) not in self.model.nodes:
+                raise Problem(f"{place}: node {text} is not defined")
+            return [int(text)]
+        if text.upper() not in self.nodes.items and text.upper() in self.elements.sets.items:
+            raise Problem(f"{place}: '{text}' is a set of elements; expected a node or a set of nodes, as *NSET, NSET=NAME, ELSET={text} makes of it")
+        return self.nodes.get(text, place, "the node set")
+
+    def face_group(self, text, place, what):
+        """The name of a surface or of a set of nodes, as the deck writes it first; None of one whose faces are left out."""
+        if text.upper() in self.bare_surfaces:
+            return None
+        known = {name.upper(): name for name in (*self.model.node_sets, *self.model.surfaces)}
+        if text.upper() not in known:
+            raise undefined(place, what, text, [*self.model.surfaces, *self.model.node_sets])
+        return known[text.upper()]
 
     def elements_of(self, text, place):
         return [int(text)] if text.isdecimal() else self.elements.sets.get(text, place, "the element set")
@@ -141,11 +159,12 @@ def name_nodes(model):
 def note_what_is_left_out(deck):
     model = deck.model
     types = list(deck.elements.left_out.values())
-    model.notes += [f"{types.count(name)} elements of type {name}" for name in dict.fromkeys(types)]
+    model.notes += [f"{counted(types.count(name), 'element')} of type {name}" for name in dict.fromkeys(types)]
     found = {}
     for block in deck.blocks:
         if block.name not in READ | SILENT:
-            found.setdefault(f"*{block.name}", []).append(block.place)
+            near = difflib.get_close_matches(block.name, READ, 1, 0.85)
+            found.setdefault(f"*{block.name}" + (f", is it *{near[0]}?" if near else ""), []).append(block.place)
         for key, value in block.options.items() if block.name in OPTIONS else ():
             if key not in OPTIONS[block.name].split(",") and f"{key}={value}".upper() not in ("OFFSET=SMID", "OP=MOD"):
                 found.setdefault(f"{key}{'=' if value else ''}{value} of *{block.name}", []).append(block.place)
@@ -242,6 +261,7 @@ def read_surfaces(deck):
         sides = {fields[1].upper() for _, fields in rows if len(fields) > 1}
         if kind not in ("ELEMENT", "NODE") or "COMBINE" in block.options or any(re.match("E", side) for side in sides):
             model.notes.append(f"the surface {name} ({line}): of no faces of elements")
+            deck.bare_surfaces[name.upper()] = name
         elif kind == "NODE":
             found = []
             for place, fields in rows:
@@ -260,6 +280,7 @@ def read_surfaces(deck):
                 model.surfaces[name] = faces
             else:
                 model.notes.append(f"the surface {name} ({line}): of no solid and no shell elements")
+                deck.bare_surfaces[name.upper()] = name
 
 
 def faces_of(model, numbers, side, place, left_out):
@@ -292,6 +313,7 @@ def read_boundaries(deck):
         for place, fields in block.rows(2, "a node or a set, and a motion from 1 to 6 or a word such as ENCASTRE"):
             name = fields[0]
             if name.isdecimal():
+                deck.nodes_of(name, f"{place}: *BOUNDARY")
                 numbers = model.node_sets.setdefault(f"node_{name}", [int(name)])
                 name = f"node_{name}"
             else:
@@ -374,7 +396,7 @@ def name_element_sets(model, elements):
             add_surface(model, elements.unnamed.names[key], flat)
     bare = [n for n, (kind, _) in model.elements.items() if kind in FLAT and n in elements.shells and n not in owned]
     if bare:
-        model.notes.append(f"stiffness and mass of {len(bare)} shells without a *SHELL SECTION: they are surfaces")
+        model.notes.append(f"stiffness and mass of {counted(len(bare), 'shell')} without a *SHELL SECTION: they are surfaces")
 
 
 def note_sets(model, elements):
@@ -383,7 +405,7 @@ def note_sets(model, elements):
         name = elements.sets.names[key]
         unknown = [n for n in numbers if n not in model.elements and n not in elements.left_out and n not in elements.lines]
         if unknown and len(unknown) < len(numbers):
-            model.notes.append(f"{len(unknown)} elements of the set {name} that are not there, {unknown[0]} the first")
+            model.notes.append(f"{counted(len(unknown), 'element')} of the set {name} that are not there, {unknown[0]} the first")
         if numbers and not any(n in model.elements or (n in elements.lines and n not in elements.left_out) for n in numbers):
             model.notes.append(f"the set {name}, whose elements are left out or not there")
 

@@ -26,11 +26,10 @@ def group_of(text, place, deck):
 
 
 def surface_of(text, place, deck):
-    known = {name.upper(): name for name in (*deck.model.surfaces, *deck.model.node_sets)}
-    if text.upper() not in known:
-        deck.note(f"the coupling to {text}, a surface that is not there", place)
-        return None
-    return known[text.upper()]
+    found = deck.face_group(text, place, "*COUPLING: the surface")
+    if found is None:
+        deck.note(f"the coupling to {text}, a surface without faces", place)
+    return found
 
 
 def coupling(block, deck):

@@ -1,7 +1,8 @@
 """Materials, their axes, and sections of Abaqus and CalculiX."""
 
 import numpy as np
-from squeal.deck_files import Problem, number
+from squeal.common import counted
+from squeal.deck_files import Problem, number, undefined
 from squeal.mesh_model import FLAT, KINDS, Part
 
 ORTHOTROPIC = ("ENGINEERING CONSTANTS", "ORTHOTROPIC", "ORTHO")
@@ -102,13 +103,17 @@ def read_sections(deck):
     their sets."""
     model, elements = deck.model, deck.elements
     owner, axes = {}, read_orientations(deck)
+    known = {name.upper(): name for block in deck.blocks if block.name == "ORIENTATION" and (name := block.options.get("NAME"))}
     for block in deck.blocks:
         if block.name not in ("SOLID SECTION", "SHELL SECTION"):
             continue
         name = block.options.get("ELSET", "")
         numbers = elements.sets.get(name, block.place, "the element set")
         part = Part([], block.options.get("MATERIAL", "").upper())
-        part.axes = axes.get(block.options.get("ORIENTATION", "").upper())
+        turned = block.options.get("ORIENTATION", "")
+        if turned and turned.upper() not in known:
+            raise undefined(block.place, f"*{block.name}: the orientation", turned, known.values())
+        part.axes = axes.get(turned.upper())
         if block.name == "SHELL SECTION":
             read_thickness(block, part, deck)
         shown = elements.sets.names[name.upper()]
@@ -141,5 +146,5 @@ def read_thickness(block, part, deck):
     part.thickness = sum(number(fields[0], place) for place, fields in rows)
     materials = {fields[2].upper() if len(fields) > 2 else "" for _, fields in rows}
     part.material = materials.pop() if len(materials) == 1 else None
-    deck.model.notes.append(f"the {len(rows)} layers of *SHELL SECTION ({deck.line_of(block.place)}): the part has their "
+    deck.model.notes.append(f"the {counted(len(rows), 'layer')} of *SHELL SECTION ({deck.line_of(block.place)}): the part has their "
                        "thickness together" + ("" if part.material else " and no material"))

@@ -1,7 +1,7 @@
 """Keywords of Abaqus and CalculiX about contacts, friction, motions, loads, and the order of steps."""
 
 import numpy as np
-from squeal.deck_files import Problem, number, whole
+from squeal.deck_files import Problem, number, undefined, whole
 
 STATIC = ("STATIC", "VISCO", "DYNAMIC", "COUPLED TEMPERATURE-DISPLACEMENT")
 COMPONENTS = 6
@@ -55,8 +55,7 @@ def interaction(block, deck):
 def change_friction(block, deck):
     name = block.options.get("INTERACTION", "").upper()
     if name not in deck.steps.interactions:
-        deck.note(f"*CHANGE FRICTION of {name or 'no interaction'}, which is not there", block.place)
-        name = None
+        raise undefined(block.place, "*CHANGE FRICTION: the interaction", name, deck.steps.interactions)
     deck.steps.current = name
 
 
@@ -102,22 +101,28 @@ def behaviour(block, deck):
 
 
 def pairs(block, deck):
-    known = {name.upper(): name for name in [*deck.model.node_sets, *deck.model.surfaces]}
+    """A contact of a surface whose faces are left out keeps its place, and a gap that is to be filled."""
+    law = block.options.get("INTERACTION", "").upper()
+    laws = [other.options.get("NAME", "") for other in deck.blocks if other.name == "SURFACE INTERACTION"]
+    if law and law not in map(str.upper, laws):
+        raise undefined(block.place, f"*{block.name}: the interaction", law, laws)
     for place, fields in block.rows(1, "the slave surface and the master surface"):
-        missing = [name for name in fields[:2] if name.upper() not in known]
-        if missing or len(fields) < 2:
-            what = f"whose surface {missing[0]} is not there" if missing else "which has one surface"
-            deck.model.notes.append(f"*{block.name} ({deck.line_of(place)}), {what}")
-            continue
-        names = tuple(known[name.upper()] for name in fields[:2])
-        if block.name == "TIE" or "TIED" in block.options:
-            deck.model.ties.append(names)
+        names = [deck.face_group(name, place, f"*{block.name}: the surface") for name in fields[:2]]
+        if len(fields) < 2:
+            deck.note(f"*{block.name}, which has one surface", place)
+        elif block.name == "CONTACT PAIR" and "TIED" not in block.options:
+            names = [name or f"FILL IN [a surface]: {of} of the deck has no faces of solids or shells" for name, of in zip(names, fields)]
+            deck.steps.pairs.append((*names, law))
+        elif None in names:
+            deck.note(f"*{block.name}, whose surface {fields[names.index(None)]} has no faces", place)
         else:
-            deck.steps.pairs.append((*names, block.options.get("INTERACTION", "").upper()))
+            deck.model.ties.append(tuple(names))
 
 
 def clearance(block, deck):
     """An initial gap of the contact of two surfaces."""
+    for key in ("SLAVE", "MASTER"):
+        deck.face_group(block.options.get(key, ""), block.place, f"*CLEARANCE: the surface {key}")
     names = tuple(block.options.get(key, "").upper() for key in ("SLAVE", "MASTER"))
     if "VALUE" not in block.options or not all(names):
         deck.note("*CLEARANCE without SLAVE, MASTER and VALUE", block.place)
@@ -130,22 +135,25 @@ def motion(block, deck):
     if block.options.get("TYPE", "DISPLACEMENT").upper() not in ("VELOCITY", "DISPLACEMENT"):
         deck.note(f"*MOTION, TYPE={block.options['TYPE']}", block.place)
         return
+    form = "a set of nodes, a rate, and two points of its axis" if turning else "a set of nodes, a motion from 1 to 3, and a velocity"
     velocities = {}  # by set, of which each line has a component
-    for place, fields in block.rows(3, "a set of nodes, a rate and an axis, or a motion and a velocity"):
-        nodes = deck.nodes_of(fields[0], place)
+    for place, fields in block.rows(3, form):
+        if not all(fields[: 2 if turning else 3]):
+            raise Problem(f"{place}: *MOTION, '{', '.join(fields)}' has a blank field; expected {form}")
+        nodes = deck.nodes_of(fields[0], f"{place}: *MOTION")
         if not turning:
-            direction = whole(fields[1], place, "a motion from 1 to 3")
+            direction = whole(fields[1], f"{place}: *MOTION", form)
             if not 1 <= direction <= 3:
-                raise Problem(f"{place}: motion {direction}; expected 1 to 3")
+                raise Problem(f"{place}: *MOTION of motion {direction}; expected {form}")
             velocity = velocities.setdefault(fields[0].upper(), [0.0] * 3)
-            velocity[direction - 1] = number(fields[2], place)
+            velocity[direction - 1] = number(fields[2], f"{place}: *MOTION")
             keys = {"velocity": velocity}
         else:
             values = [number(field or "0", place) for field in (fields[1:] + ["0"] * 6)[:7]]
             start, end = values[1:4], values[4:7]
             axis = [b - a for a, b in zip(start, end)]
             if not any(axis):
-                raise Problem(f"{place}: the axis has one point; expected two")
+                raise Problem(f"{place}: *MOTION: the axis has one point; expected {form}")
             keys = {"rotation": {"axis": axis, "centre": start, "rate": values[0]}}
         deck.steps.drives.append((set(nodes), keys))
 
@@ -190,12 +198,12 @@ def tighten(deck, node, value):
 
 def surface_pressure(block, deck):
     replaced(block, deck, "pressure")
-    known = {name.upper(): name for name in (*deck.model.surfaces, *deck.model.node_sets)}
     for place, fields in block.rows(3, "a surface, P, and a pressure"):
-        if fields[1].upper() != "P" or fields[0].upper() not in known:
-            deck.note(f"*DSLOAD of type {fields[1]} on {fields[0]}" + ("" if fields[0].upper() in known else ", which is not there"), place)
+        name = deck.face_group(fields[0], place, "*DSLOAD: the surface")
+        if fields[1].upper() != "P" or name is None:
+            deck.note(f"*DSLOAD of type {fields[1]} on {fields[0]}" + ("" if name else ", which has no faces"), place)
             continue
-        deck.steps.loads["pressure", known[fields[0].upper()]] = number(fields[2], place)
+        deck.steps.loads["pressure", name] = number(fields[2], place)
 
 
 def element_load(block, deck):
@@ -265,11 +273,10 @@ def add_bolt(deck, node, block, axis):
         deck.note(f"*PRE-TENSION SECTION of node {node}, which no *CLOAD tightens", block.place)
         return
     keys = {"name": bolt_name(deck, node), "tension": deck.tension[node]}
-    known = {name.upper(): name for name in model.surfaces}
-    surface = known.get(options.get("SURFACE", "").upper())
+    surface = deck.face_group(options["SURFACE"], block.place, "*PRE-TENSION SECTION: the surface") if options.get("SURFACE") else None
     if options.get("ELEMENT", "").isdecimal() and int(options["ELEMENT"]) in deck.beams:
         model.joints.bolts.append((deck.beams[int(options["ELEMENT"])], keys))
-    elif surface:
+    elif surface in model.surfaces:
         model.bolts.append((surface, {**keys, "axis": axis or normal_of(model, surface)}))
     else:
         deck.note("*PRE-TENSION SECTION of no surface and no beam that is there", block.place)
@@ -293,9 +300,9 @@ def add_contacts(deck, ends):
         keys = {"friction": 0.0, **deck.steps.interactions.get(name, {})}
         keys |= {"gap": gap} if (gap := deck.steps.gaps.get((slave.upper(), master.upper()))) else {}
         for moving, drive in deck.steps.drives:
-            if nodes_of[master] <= moving:
+            if nodes_of.get(master, moving | {0}) <= moving:
                 keys |= drive
-            elif nodes_of[slave] <= moving:
+            elif nodes_of.get(slave, moving | {0}) <= moving:
                 keys |= {**drive, "slave": "rotor"}
         if "rotation" in keys or "velocity" in keys or not keys["friction"]:
             keys.pop("slip_compliance", None)

@@ -5,8 +5,10 @@ import re
 from collections import Counter
 
 import numpy as np
+from squeal import ansys_joining
+from squeal.common import counted
 from squeal.deck_files import Problem, lines_of, number, whole
-from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part, corners_of
+from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part
 
 # squeal's kinds by element type and by the number of different nodes
 SOLIDS = {45: 8, 65: 8, 185: 8, 190: 8, 95: 20, 186: 20, 92: 10, 187: 10, 285: 4}
@@ -22,7 +24,7 @@ WEDGE_OF = [0, 1, 2, 4, 5, 6]
 TET_OF = [0, 1, 2, 4]
 SILENT = set("/COM /NOPR /GOPR /PREP7 /TITLE /SOLU /GO /OUTPUT /UNITS /VIEW /AUTO FINISH NUMOFF *IF *ELSE *ENDIF *SET DOF N R5.3 MPTEMP "
              "EXTOPT TREF IRLF BFUNIF ACEL OMEGA DOMEGA CGLOC CGOMEGA DCGOMG KUSE TIME ALPHAD BETAD DMPRAT DMPSTR CRPLIM NCNV "
-             "NEQIT ERESX TOFFST RLBLOCK KEYOPT SECTYPE SECBLOCK ANTYPE ETBLOCK LSCLEAR FCUM DELTIM KBC SHPP SHELL".split())
+             "NEQIT ERESX TOFFST SECTYPE SECBLOCK ANTYPE ETBLOCK LSCLEAR FCUM DELTIM KBC SHPP SHELL".split())
 
 
 class Deck:
@@ -33,6 +35,10 @@ class Deck:
         self.types, self.materials = {}, {}
         self.constants = {}  # of materials by number and label
         self.of_pair = {}  # faces and kind by the number of a real constant: "target", "contact"
+        self.sides = {}  # (real constant, "target" or "contact") by the numbers of such elements
+        self.reals, self.masses = {}, []  # values by real constant; (place, node, real constant, type) of MASS21
+        self.options = {}  # of element types, by type and number of the option
+        self.turning = []  # (name of a component, vector of its rate, place)
         self.frictions = {}
         self.held = {}
         self.bodies = {}  # elements by material and type
@@ -184,12 +190,13 @@ def add_element(deck, place, label, attributes, nodes):
     elif kind in TARGETS | CONTACTS:
         side = "target" if kind in TARGETS else "contact"
         deck.of_pair.setdefault(real, {"material": material}).setdefault(side, []).append(face_of(nodes))
+        deck.sides[label] = real, side
         if side == "contact":
-            deck.of_pair[real]["material"] = material
+            deck.of_pair[real] |= {"material": material, "type": kind_number}
     elif kind == 179:
         deck.bolts.setdefault(section, []).append((place, nodes))
     elif kind == 21:
-        deck.other_elements["MASS21"] += 1
+        deck.masses.append((place, nodes[0], real, kind_number))
     else:
         deck.other_elements[f"type {kind}"] += 1
 
@@ -225,7 +232,24 @@ def read_component(words, lines, deck):
         deck.model.element_sets[name] = items
 
 
-BLOCKS = {"NBLOCK": read_nodes, "EBLOCK": read_elements, "CMBLOCK": read_component}
+def read_reals(words, lines, deck):
+    """RLBLOCK: of each set its number, its count and six values, then seven a line."""
+    if not lines.more():
+        raise Problem(f"{lines.place()}: RLBLOCK without a format")
+    first = widths_of(lines.next(), lines.place())
+    more = widths_of(lines.next(), lines.place()) if lines.more() else first
+    for _ in range(whole(words[1] if len(words) > 1 else "", lines.place())):
+        fields = fields_of(lines.next(), first) if lines.more() else []
+        place = lines.place()
+        if len(fields) < 2:
+            raise Problem(f"{place}: RLBLOCK ends before its {words[1]} sets; expected a set's number, its count and its values")
+        values = [number(field or "0", place) for field in fields[2:]]
+        while len(values) < whole(fields[1], place) and lines.more():
+            values += [number(field or "0", lines.place()) for field in fields_of(lines.next(), more)] or [0.0]
+        deck.reals[whole(fields[0], place)] = values
+
+
+BLOCKS = {"RLBLOCK": read_reals, "NBLOCK": read_nodes, "EBLOCK": read_elements, "CMBLOCK": read_component}
 
 # ---- commands
 
@@ -281,7 +305,24 @@ def gravity(words, place, deck):
         deck.model.gravity = [-v for v in values]  # an acceleration of the frame
 
 
-COMMANDS = {"ET": element_type, "MPDATA": material_data, "MP": material_data, "D": support, "F": force, "CE": equation, "ACEL": gravity}
+def key_option(words, place, deck):
+    if len(words) > 3:
+        deck.options[whole(words[1], place), whole(words[2], place)] = whole(words[3] or "0", place)
+
+
+def real_constants(words, place, deck):
+    """R,set,value,…; those of contacts are penalties, which a scene has not."""
+    deck.reals[whole(words[1] if len(words) > 1 else "", place)] = [number(word or "0", place) for word in words[2:8]]
+
+
+def rotation(words, place, deck):
+    """CMROTATE,component,x,y,z: the rate about the global axes of the elements that turn."""
+    rate = [number(word or "0", place) for word in (words[2:] + ["0"] * 3)[:3]]
+    if any(rate):
+        deck.turning.append((words[1] if len(words) > 1 else "", rate, place))
+
+
+COMMANDS = {"R": real_constants, "CMROTATE": rotation, "KEYOPT": key_option, "ET": element_type, "MPDATA": material_data, "MP": material_data, "D": support, "F": force, "CE": equation, "ACEL": gravity}
 
 
 # ---- what the whole deck makes
@@ -297,19 +338,23 @@ def finish(deck):
     for (material, section), elements in deck.bodies.items():
         name = f"material_{material}" + (f"_shells_{section}" if section and several[material] > 1 else "")
         model.parts[model.unused(name)] = Part(elements, material)
-    name_parts(model)
+    rotors = ansys_joining.rotors_of(deck)
+    name_parts(deck)
     supports(deck)
-    pairs(deck)
+    ansys_joining.pairs(deck, rotors)
+    ansys_joining.masses(deck)
     for section, elements in deck.bolts.items():
         deck.note(f"the bolt of section {section}: {len(elements)} PRETS179, whose two sides have nodes of their own", elements[0][0])
-    model.notes += [f"{count} elements of {name}" for name, count in sorted(deck.other_elements.items())]
+    model.notes += [f"{counted(count, 'element')} of {name}" for name, count in sorted(deck.other_elements.items())]
     if deck.left_out:
         model.notes.append("the commands " + ", ".join(f"{name} ({count})" for name, count in sorted(deck.left_out.items())))
 
 
-def name_parts(model):
+def name_parts(deck):
     """A part whose elements are those of a component has its name."""
+    model = deck.model
     for name, elements in list(model.element_sets.items()):
+        elements = [n for n in elements if n not in deck.sides]
         known = [n for n in elements if n in model.elements]
         if len(known) < len(elements):
             model.notes.append(f"{len(elements) - len(known)} of the {len(elements)} elements of {name}, which the mesh has not")
@@ -357,24 +402,3 @@ def supports(deck):
         values = [dict(held).get(m, 0.0) for m in MOTIONS]
         keys = {"displacement": values[:3]} if any(values[:3]) else {}
         model.supports.append((name, motions, keys | ({"rotation": values[3:]} if any(values[3:]) else {})))
-
-
-def pairs(deck):
-    """Contact and target elements of one real constant are a contact; its material has the friction."""
-    model, free = deck.model, None
-    for real, pair in deck.of_pair.items():
-        if "target" not in pair or "contact" not in pair:
-            model.notes.append(f"the {'target' if 'target' in pair else 'contact'} elements of real constant {real}, which have no other side")
-            continue
-        free = free or model.free_faces(model.solids())
-        names = []
-        for side in ("contact", "target"):
-            faces = [free[corners_of(face)] for face in pair[side] if len(face) in (3, 4, 6, 8) and corners_of(face) in free]
-            if len(faces) < len(pair[side]):
-                model.notes.append(f"{len(pair[side]) - len(faces)} {side} elements of real constant {real}, which lie on no solid")
-            if faces:
-                names.append(model.unused(f"{side}_{real}"))
-                model.surfaces[names[-1]] = faces
-        if len(names) == 2:
-            friction = deck.constants.get(pair["material"], {}).get("MU", 0.0)
-            model.contacts.append((*names, {"friction": friction}))

@@ -95,7 +95,12 @@ def save_picture(figure, file, dpi):
 
     figure.savefig(file, dpi=dpi)
     if Path(file).suffix == ".png":
-        Image.open(file).convert("RGB").quantize(256).save(file, optimize=True)
+        Image.open(file).convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE).save(file, optimize=True)
+
+
+def counted(count, what):
+    """A number of things: 1 line, 2 lines."""
+    return f"{count} {what}" + ("" if count == 1 else "s")
 
 
 def arguments_and_options():

@@ -1,5 +1,6 @@
 """Decks of other codes as text: keyword blocks of Abaqus and CalculiX, cards of Nastran, each with its place."""
 
+import difflib
 import math
 import re
 import warnings
@@ -7,8 +8,20 @@ import warnings
 import numpy as np
 
 
+MOST_NAMES = 30  # that a message lists
+
+
 class Problem(Exception):
     """What is wrong with the input, in one sentence that names file, line and what was expected."""
+
+
+def undefined(place, what, name, known):
+    """A reference to what the deck does not define: the nearest name of its kind, and those that there are."""
+    shown = {str(other).upper(): str(other) for other in known}
+    near = difflib.get_close_matches(str(name).upper(), shown, 1)
+    others = list(shown.values())
+    listed = ", ".join(others[:MOST_NAMES]) + (f" and {len(others) - MOST_NAMES} others" if len(others) > MOST_NAMES else "")
+    return Problem(f"{place}: {what} '{name}' is not defined" + (f" (is it {shown[near[0]]}?)" if near else "") + f"; known are {listed or 'none'}")
 
 
 def lines_of(file):
@@ -74,7 +87,7 @@ class Block:
             while fields and fields[-1] == "":
                 fields.pop()
             if len(fields) < least:
-                raise Problem(f"{place}: '{line[:60]}': {len(fields)} fields; expected {what}")
+                raise Problem(f"{place}: *{self.name}, '{line[:60]}': {len(fields)} fields; expected {what}")
             yield place, fields
 
     def table(self, width, kind):

@@ -50,6 +50,8 @@ class Tables:
 
     def make(self):
         self.drop_wrong_followers()
+        self.gather_forces()
+        self.gather_supports()
         for node in self.joints.ends():
             if node in self.model.nodes:
                 self.make_node(node)
@@ -73,6 +75,42 @@ class Tables:
 
     def note(self, what):
         self.model.notes.append(what)
+
+    def group_of(self, nodes, name):
+        """The name of the set that has just these nodes, or of a new one."""
+        known = {frozenset(of): shown for shown, of in self.model.node_sets.items()}
+        known |= {frozenset(n for face in faces for n in face): shown for shown, faces in self.model.surfaces.items()}
+        shown = known.get(frozenset(nodes)) or self.model.unused(name)
+        if shown not in self.model.surfaces:
+            self.model.node_sets[shown] = nodes
+        return shown
+
+    def gather_forces(self):
+        """Nodes of elements with one force, which all steps scale alike, are a group with the sum of theirs."""
+        model, forces, alike = self.model, self.joints.forces, {}
+        for node in [node for node in forces if node in self.used and not any(forces[node][3:])]:
+            factors = tuple(of.get(("force", node), 1.0) for _, of, *_ in model.steps)
+            alike.setdefault((tuple(forces[node][:3]), factors), []).append(node)
+        for (vector, _), nodes in alike.items():
+            if len(nodes) < 2:
+                continue
+            for _, of, *_ in model.steps:
+                of["group", len(model.forces)] = of.get(("force", nodes[0]), 1.0)
+            model.forces.append((self.group_of(nodes, f"loaded_{len(model.forces) + 1}"), {"vector": [len(nodes) * v for v in vector]}))
+            for node in nodes:
+                del forces[node]
+
+    def gather_supports(self):
+        """Nodes of a line each that are held alike are a group."""
+        model, alike = self.model, {}
+        for name, motions, keys in model.supports:
+            nodes = model.node_sets.get(name, ())
+            if len(nodes) == 1 and name == f"node_{nodes[0]}":
+                alike.setdefault((tuple(motions), repr(keys)), []).append((name, motions, keys))
+        for i, rows in enumerate((rows for rows in alike.values() if len(rows) > 1), 1):
+            nodes = [model.node_sets.pop(name)[0] for name, *_ in rows]
+            model.supports = [row for row in model.supports if row not in rows]
+            model.supports.append((self.group_of(nodes, f"held_{i}"), *rows[0][1:]))
 
     def drop_wrong_followers(self):
         joints, model = self.joints, self.model

@@ -4,13 +4,14 @@ import tomllib
 
 import numpy as np
 from squeal.deck_files import Problem
-from squeal.mesh_model import EDGES, FLAT, KINDS, MOTIONS, Model, Part, corners_of, gmsh_order
+from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part, corners_of, order_back
 from squeal.msh_mesh import KIND_OF, read_mesh
+from squeal.scene import with_numbers
 
 TYPES = {"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8", "hex20": "C3D20", "wedge6": "C3D6", "tri3": "S3", "quad4": "S4"}
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-WRITTEN = {"title", "gravity", "mesh", "part", "point", "rigid_body", "coupling", "spring", "connector", "beam", "mass", "support",
-           "force", "pressure", "bolt", "contact", "step", "tie", "friction", "damping", "modes"}
+WRITTEN = set("title gravity numbers mesh part point rigid_body coupling spring connector beam mass support force pressure bolt rotor contact "
+              "step tie friction damping modes".split())
 
 
 def vector(given):
@@ -35,7 +36,7 @@ class Writer:
         self.file, self.notes = file, []
         with open(file, "rb") as stream:
             try:
-                self.scene = tomllib.load(stream)
+                self.scene = with_numbers(tomllib.load(stream))
             except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
                 raise Problem(f"{file}: {error}") from None
         if "mesh" not in self.scene:
@@ -49,6 +50,7 @@ class Writer:
     def write(self):
         mesh = self.mesh = read_mesh(self.file.parent / self.scene["mesh"]["file"], self.scene["mesh"].get("parameters", {}))
         self.fill_model()
+        self.drive_contacts()
         self.next_node = max(mesh.nodes) + 1
         self.next_element = len(self.model.elements) + 1
         self.write_mesh()
@@ -89,6 +91,14 @@ class Writer:
         missing = [name for name in parts if name not in model.parts]
         if missing:
             raise Problem(f"{self.file}: part {missing[0]} has no elements; the mesh has {', '.join(self.mesh.names())}")
+
+    def drive_contacts(self):
+        """A contact takes the drive of the [[rotor]] whose part has all nodes of its rotor's side."""
+        for contact in self.many("contact"):
+            side = {n for face in self.model.surfaces.get(contact["rotor"], ()) for n in face}
+            for rotor in self.many("rotor") if side else ():
+                if side <= {n for label in self.model.parts[rotor["part"]].elements for n in self.model.elements[label][1]}:
+                    contact |= {"rotation": rotor} if "rate" in rotor else {"velocity": rotor["velocity"]}
 
     def add(self, keyword, *rows):
         self.lines += [f"*{keyword}", *rows]
@@ -150,8 +160,7 @@ class Writer:
             own = part if "alpha" in part or "beta" in part else self.scene.get("damping", {})
             words = [f"{word}={own[key]!r}" for key, word in (("alpha", "ALPHA"), ("beta", "BETA")) if own.get(key)]
             words += [f"STRUCTURAL={part['loss_factor']!r}"] if part.get("loss_factor") else []
-            if words:
-                self.add("DAMPING, " + ", ".join(words))
+            self.lines += ["*DAMPING, " + ", ".join(words)] if words else []
             if law:
                 orientation = f", ORIENTATION=axes_{name}"
                 if "cylinder" in law:
@@ -165,7 +174,7 @@ class Writer:
             else:
                 self.add(f"SOLID SECTION, ELSET={name}, MATERIAL=of_{name}{orientation}")
             self.notes += [f"rotation of part {name}"] if "rotation" in part else []
-        self.notes += [f"{key} of [damping]" for key in ("measured", "loss_frequency") if key in self.scene.get("damping", {})]
+        self.notes += ["loss_frequency of [damping]"] * ("loss_frequency" in self.scene.get("damping", {}))
         self.notes += [f"{key} of [friction]" for key in ("direction_damping", "slipped_pairs_stick") if key in self.scene.get("friction", {})]
 
     def new_node(self, name, at):
@@ -298,8 +307,7 @@ class Writer:
             inner = [self.new_node(f"{beam['name']}_{i}", start + (end - start) * i / count) for i in range(1, count)]
             self.add(f"MATERIAL, NAME=of_{beam['name']}")
             self.add("ELASTIC", numbers([beam["young"], beam.get("poisson", 0)]))
-            if beam.get("density"):
-                self.add("DENSITY", numbers([beam["density"]]))
+            self.lines += ["*DENSITY", numbers([beam["density"]])] if beam.get("density") else []
             chain = [a, *inner, b]
             self.beam_element[beam["name"]] = self.next_element
             for first, second in zip(chain, chain[1:]):
@@ -429,12 +437,6 @@ class Writer:
             elif any(contact.get("velocity", ())):
                 rows = [f"{target}, {m}, {float(v)!r}" for m, v in enumerate(contact["velocity"], 1) if v]
                 self.add("MOTION, TRANSLATION, TYPE=VELOCITY", *rows)
-
-
-def order_back(kind):
-    """Where Abaqus's nodes of an element stand in gmsh's order."""
-    order = gmsh_order(kind, "abaqus")
-    return [order.index(i) for i in range(len(order))] if kind in EDGES["gmsh"] else list(range(len(order)))
 
 
 def write_deck(scene, target):

@@ -6,6 +6,7 @@ and Nastran those of bricks. An order is here the list of the edges whose mid-si
 """
 
 import numpy as np
+from squeal.common import counted
 from squeal.deck_files import Problem
 from squeal.deck_joints import Joints
 
@@ -41,6 +42,12 @@ def gmsh_order(kind, code):
     return [*range(corners), *(place[frozenset(edge)] for edge in EDGES["gmsh"][kind])]
 
 
+def order_back(kind):
+    """Where Abaqus's nodes of an element stand in gmsh's order."""
+    order = gmsh_order(kind, "abaqus")
+    return [order.index(i) for i in range(len(order))] if kind in EDGES["gmsh"] else list(range(len(order)))
+
+
 class Part:
     def __init__(self, elements, material=None, thickness=0.0):
         self.elements, self.material, self.thickness = elements, material, thickness
@@ -60,9 +67,11 @@ class Model:
         self.node_sets = {}  # name: nodes
         self.materials = {}  # name: {"young": , "poisson": , "density": , "loss_factor": , "alpha": , "beta": }
         self.loss_factor = 0.0  # of all parts, beside those of their materials
+        self.loss_frequency = 0.0  # [Hz] of their viscous equivalent
         self.supports = []  # (name of a node set, motions, other keys of its table)
         self.ties = []  # (slave, master)
         self.contacts = []  # (slave, master, other keys of its table)
+        self.rotors = []  # (part, other keys of its table)
         self.forces = []  # (name of a node set, keys): on groups; those on nodes of their own are among the joints
         self.pressures = []  # (name of a surface, keys)
         self.masses = []  # (name of a node set, mass)
@@ -160,7 +169,7 @@ class Model:
                 self.notes.append(f"the set {name}{its}, whose nodes no element has")
                 del self.node_sets[name]
             elif lost:
-                self.notes.append(f"{lost} nodes of the set {name}, which no element has")
+                self.notes.append(f"{counted(lost, 'node')} of the set {name}, which no element has")
         self.supports = [support for support in self.supports if support[0] in self.node_sets]
 
     def drop_idle_supports(self):
@@ -243,7 +252,7 @@ class Model:
                     shown = self.unused(name + "_faces")
                     self.call_faces(name, shown)
                     if shown in self.joints.rigid_groups():
-                        self.notes.append(f"{len(wanted - covered)} nodes of {name} in its rigid coupling, which are on no face of it")
+                        self.notes.append(f"{counted(len(wanted - covered), 'node')} of {name} in its rigid coupling, which are on no face of it")
                 self.surfaces[shown] = [free[key] for key in sorted(keys, key=sorted)]
 
     def drop_ties_without_faces(self):

@@ -6,7 +6,7 @@ from collections import Counter
 
 from squeal import nastran_joining
 import numpy as np
-from squeal.deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes, number, sections_of, whole
+from squeal.deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes, number, sections_of, undefined, whole
 from squeal.mesh_model import FLAT, MOTIONS, Model, corners_of
 from squeal.nastran_properties import note_shell_fields, read_materials, read_properties
 
@@ -34,6 +34,10 @@ class Deck:
     def line_of(self, card):
         file, _, line = card.place.rpartition(", ")
         return line if file == str(self.model.source) else card.place
+
+    def has_unread(self, beginning, number):
+        """Whether a card of such a name has this number: what is there, and is left out."""
+        return any(card.name.startswith(beginning) and card.field(2) == number for card in self.cards)
 
     def note(self, what, card):
         self.model.notes.append(f"{what} ({self.line_of(card)})")
@@ -263,7 +267,7 @@ def applied_supports(cards, case, model):
         applied |= {n} if n not in sums else {n, *sums[n]}
     missing = applied - set(known) - set(sums)
     if missing:
-        model.notes.append(f"SPC {joined(missing)}, which the case control selects and the deck has not")
+        raise undefined(model.source, "case control, SPC: the set", joined(missing), [*known, *sums])
     others = set(known) - applied
     if others:
         model.notes.append(f"SPC {joined(others)}, which the case control does not select")

@@ -4,7 +4,7 @@ surfaces, contacts."""
 import re
 
 import numpy as np
-from squeal.deck_files import Problem, whole
+from squeal.deck_files import Problem, undefined, whole
 from squeal.mesh_model import MOTIONS
 
 ALL = "123456"
@@ -61,13 +61,17 @@ def mean(card, deck):
     deck.model.joints.names.setdefault(card.whole(4), f"rbe3_{card.field(2)}_node")
 
 
+def no_property(card, deck, names):
+    return undefined(card.place, f"{card.name} {card.field(2)}: the property", card.field(3), [of for name, of in deck.properties if name in names])
+
+
 def scalar(card, deck):
     """CELAS1, CELAS2, CDAMP1 and CDAMP2: between a motion of one node and the same of another, or the ground."""
     key, by_property = ("stiffness" if card.name.startswith("CELAS") else "damping"), card.name.endswith("1")
     if by_property:
         found = deck.properties.get(("PELAS" if key == "stiffness" else "PDAMP", card.field(3)))
         if found is None:
-            raise Problem(f"{card.place}: {card.name} {card.field(2)} has property {card.field(3)}, which is not there")
+            raise no_property(card, deck, ("PELAS", "PDAMP"))
         value = found.number(3, 0.0)
     else:
         value = card.number(3, 0.0)
@@ -88,7 +92,7 @@ def bushing(card, deck):
     """CBUSH: six constants along the axes of its system, or along the line between its nodes."""
     found = deck.properties.get(("PBUSH", card.field(3)))
     if found is None:
-        raise Problem(f"{card.place}: CBUSH {card.field(2)} has property {card.field(3)}, which is not there")
+        raise no_property(card, deck, ("PBUSH",))
     keys = constants_of(found, deck)
     a, b = card.whole(4), card.whole(5, 0) or None
     if card.field(9):
@@ -140,12 +144,14 @@ def concentrated_mass(card, deck):
 
 def bar(card, deck):
     """CBAR, CBEAM and CROD by PBAR, PBARL, PBEAM, PBEAML."""
-    section = None
-    for name in ("PBAR", "PBARL", "PBEAM", "PBEAML"):
+    section, material = None, None
+    for name in BAR_PROPERTIES:
         if found := deck.properties.get((name, card.field(3))):
             section = section_of(found)
-            material = deck.model.materials.get(found.field(3), {})
-    if not section or not material.get("young"):
+            material = deck.model.materials.get(found.field(3), {"young": 0})
+    if not material and not deck.has_unread("P", card.field(3)):
+        raise no_property(card, deck, BAR_PROPERTIES)
+    if not section or not material or not material.get("young"):
         deck.note(f"{card.name} {card.field(2)}, of a section or material that is not read", card)
         return
     a, b = card.whole(4), card.whole(5)
@@ -220,6 +226,7 @@ def gravity(card, deck, factor):
     deck.model.gravity = (card.number(4, 0.0) * factor * direction).tolist()
 
 
+OTHER_LOADS = ("FORCE", "MOMENT", "PLOAD", "RFORCE", "ACCEL", "TEMP", "SPCD", "DEFORM", "SLOAD")  # whose sets are there, and not read
 LOADS = {"FORCE": force, "MOMENT": force, "PLOAD4": pressure, "GRAV": gravity}
 
 
@@ -231,10 +238,16 @@ def read_loads(cards, case, deck):
     if len(chosen) > 1:
         deck.model.notes.append(f"LOAD {', '.join(map(str, chosen[:-1]))} of other subcases: the loads are those of LOAD {chosen[-1]}")
     factors = {}
+    for number in chosen:
+        if number not in known and number not in sums and not any(deck.has_unread(name, str(number)) for name in OTHER_LOADS):
+            raise undefined(deck.model.source, "case control, LOAD: the set", number, [*sums, *known])
     for number in chosen[-1:] or [n for n in known if not sums]:
         if number in sums:
             card = sums[number]
             overall = card.number(3, 1.0)
+            for text in card.fields[3::2]:
+                if text and whole(text, card.place) not in known and not any(deck.has_unread(name, text) for name in OTHER_LOADS):
+                    raise undefined(card.place, "LOAD: the set", text, known)
             for i in range(4, 2 + len(card.fields) - 1, 2):
                 if card.field(i + 1):
                     factors[card.whole(i + 1)] = factors.get(card.whole(i + 1), 0.0) + overall * card.number(i, 1.0)
@@ -279,10 +292,12 @@ def surface(card, deck):
 def contact(card, deck):
     """CONTACT and TIE of two surfaces or sets."""
     first = 3 if card.name == "TIE" else 4
-    slave, master = (deck.surfaces.get(card.field(i)) for i in (first, first + 1))
-    if slave is None or master is None:
-        deck.note(f"{card.name} {card.field(2)}, of a surface that is not there", card)
-        return
+    sides = []
+    for i in (first, first + 1):
+        if card.field(i) not in deck.surfaces and not deck.has_unread("S", card.field(i)):
+            raise undefined(card.place, f"{card.name} {card.field(2)}: the surface", card.field(i), deck.surfaces)
+        sides.append(deck.surfaces.get(card.field(i), f"FILL IN [a surface]: {card.field(i)} of the deck has no faces of its elements"))
+    slave, master = sides
     what, keys = card.field(3).upper(), {}
     if card.name == "TIE" or what == "FREEZE":
         deck.model.ties.append((slave, master))
@@ -292,6 +307,8 @@ def contact(card, deck):
         keys |= friction_of(found, deck)
     elif "." in what:
         keys["friction"] = card.number(3)
+    elif what.isdecimal() and not deck.has_unread("PCONT", what):
+        raise no_property(card, deck, ("PCONT",))
     elif what not in ("SLIDE", ""):
         deck.note(f"{what} of CONTACT {card.field(2)}: it is smooth", card)
     deck.model.contacts.append((slave, master, keys))
@@ -315,5 +332,6 @@ def friction_of(card, deck):
 HANDLERS = {"RBE2": rigid, "RBAR": rigid_bar, "RBE3": mean, "CELAS1": scalar, "CELAS2": scalar, "CDAMP1": scalar, "CDAMP2": scalar,
             "CBUSH": bushing, "CONM2": concentrated_mass, "CBAR": bar, "CBEAM": bar, "SURF": surface, "CONTACT": contact,
             "TIE": contact}
+BAR_PROPERTIES = ("PBAR", "PBARL", "PBEAM", "PBEAML")
 PROPERTIES = {"PELAS", "PDAMP", "PBUSH", "PBAR", "PBARL", "PBEAM", "PBEAML", "PCONT"}
 READ = {*HANDLERS, *PROPERTIES, *LOADS, "LOAD", "EIGRL", "EIGC", "SET"}

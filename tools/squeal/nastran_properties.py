@@ -17,12 +17,13 @@ def note_shell_fields(cards, model):
 
 
 def read_materials(cards, deck):
-    """GE of a material and G of all are loss factors; WTMASS multiplies densities."""
+    """GE of a material and G of all are loss factors, W3 and W4 where they have their viscous equivalent; WTMASS multiplies densities."""
     model, values = deck.model, {}
     for card in cards:
         if card.name == "PARAM":
             values[card.field(2).upper()] = card
-    others = sorted(set(values) - {"WTMASS", "G", "POST"})
+    model.loss_frequency = max(values[name].number(3, 0.0) if name in values else 0.0 for name in ("W3", "W4")) / (2 * np.pi)
+    others = sorted(set(values) - {"WTMASS", "G", "POST", "W3", "W4"})
     if others:
         model.notes.append("PARAM " + ", ".join(others))
     mass = values["WTMASS"].number(3, 1.0) if "WTMASS" in values else 1.0

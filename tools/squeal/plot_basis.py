@@ -9,6 +9,7 @@ import matplotlib
 import numpy as np
 from squeal.common import BLUE, ORANGE, RED  # noqa: F401, of the pictures too
 from squeal import Missing
+from squeal.scene import with_numbers
 
 OPEN, STICK, SLIP = "#c9c9c9", ORANGE, BLUE  # of the contact states 0, 1 and 2
 STATES = {"open": OPEN, "stick": STICK, "slip": SLIP}
@@ -19,9 +20,9 @@ ABSENT = []  # the runs that a picture which is being drawn lacks, with the reas
 
 
 def scene_of(run):
-    """The scene that was run, with every default; empty where its file is not there."""
+    """The scene that was run, with every default and with numbers in place of their names; empty where its file is not there."""
     file = run.folder / "resolved.toml"
-    return tomllib.loads(file.read_text()) if file.exists() else {}
+    return with_numbers(tomllib.loads(file.read_text())) if file.exists() else {}
 
 
 def frequency_unit(largest):

@@ -28,7 +28,7 @@ def closed(runs):
 
 def of_model(runs, figure):
     drawn = "; ".join(axes.get_title() for axes in figure.axes)
-    return f"The parts, each in its colour ({drawn}). Red points are centres of pressure, arrows the way of the rotors, in steady sliding."
+    return f"The parts, each in its colour ({drawn}). Red points are centres of pressure, seen through the parts, arrows the way of the rotors, in steady sliding."
 
 
 def of_shape(runs, figure):
@@ -63,7 +63,8 @@ def of_cycle(runs, figure):
 
 
 def of_powers(runs, figure):
-    return sentences(("What feeds the vibration and what takes its energy round one period.", True), ("The means of a limit cycle cancel.", closed(runs)))
+    return sentences(("What feeds the vibration and what takes its energy round one period.", True), ("The means of a limit cycle cancel.", closed(runs)),
+                     ("Below, the mechanical energy, which the powers change, with the work against the preload; and the energy of the motion alone.", True))
 
 
 def of_pressure(runs, figure):
@@ -74,12 +75,13 @@ def of_pressure(runs, figure):
 def of_sweep(runs, figure):
     drawn = words_in(figure)
     maps = any(axes.get_label() == "<colorbar>" for axes in figure.axes)
-    counts = "points unstable" in drawn
+    counts = hasattr(figure, "not_counted")
     return sentences(("Largest growth rate over the plane of two numbers.", maps), ("How many points have an unstable mode near a frequency.", counts),
                      ("Frequency and growth of the modes against a number of the scene.", not maps and not counts),
                      ("Coloured modes are unstable somewhere, grey ones nowhere.", not maps and "grows most" in drawn),
-                     ("Dotted lines are thresholds.", "threshold, with its value" in drawn), ("Larger marks are thresholds, one mark a mode.", "threshold of mode" in drawn),
-                     ("Crosses are points that failed.", "point that failed" in drawn), ("Black marks are motions that were found there.", "cycle, " in drawn or "settled motion" in drawn))
+                     ("Dotted lines are thresholds.", "threshold, with its value" in drawn),
+                     *((sentence, True) for sentence in getattr(figure, "not_counted", [])),
+                     ("Crosses are points that failed.", "point that failed" in drawn))
 
 
 def of_thresholds(runs, figure):

@@ -100,17 +100,22 @@ def draw_cycle(runs):
 POWERS = {"contact_power": ("contact forces", SLIP), "damping_power": ("damping", RED), "load_power": ("load", "0.55")}
 
 
+ENERGIES = {"energy": ("mechanical energy, whose slope is the sum of powers", "-"),
+            "fluctuating_energy": ("energy of the motion about equilibrium", ":")}
+
+
 def powers_of(run):
     run.stage("cycle")
-    return {name: run.series("cycle", name) for name in (*POWERS, "time", "fluctuating_energy")}
+    return {name: run.series("cycle", name) for name in (*POWERS, "time", *ENERGIES)}
 
 
 def draw_powers(runs):
-    """Powers on the structure round the cycle. Damping's stands with the sign with which it takes energy away."""
+    """Powers on the structure round the cycle, and the energies less their means. Damping's power stands with the sign with which
+    it takes energy away. The mechanical energy has the work against the preload, which the energy of the motion has not."""
     found = those_with(runs, powers_of)
     figure, (above, below) = plt.subplots(2, 1, figsize=(8, 6.2), sharex=True)
     size, unit = unit_of(np.concatenate([powers[name] for _, powers in found for name in POWERS]), "W")
-    e_size, e_unit = unit_of(np.concatenate([powers["fluctuating_energy"] for _, powers in found]), "J")
+    e_size, e_unit = unit_of(np.concatenate([powers[name] - powers[name].mean() for _, powers in found for name in ENERGIES]), "J")
     for k, (run, powers) in enumerate(found):
         phase = powers["time"] / run.report["cycle"]["period"]
         powers = {name: np.roll(values, -start_of(run, runs)) for name, values in powers.items()}
@@ -123,12 +128,16 @@ def draw_powers(runs):
         shade = "black" if len(found) == 1 else colour(k)
         above.plot(phase, total / size, color=shade, lw=1.2, ls="--" if len(found) == 1 else "-",
                    label=label_of(run, runs, f"sum, mean {total.mean() / size:+.1g} {unit}"))
-        below.plot(phase, powers["fluctuating_energy"] / e_size, color=shade, lw=1.6, label=label_of(run, runs))
+        for name, (words, style) in ENERGIES.items():
+            mean = powers[name].mean()
+            below.plot(phase, (powers[name] - mean) / e_size, color=shade, lw=1.6, ls=style,
+                       label=label_of(run, runs, f"{words.replace(', ', chr(10))}\nabout {mean / e_size:.4g} {e_unit}"))
     above.axhline(0, color="0.5", lw=0.8)
     words = cycle_words(*(run for run, _ in found)).replace(" (", "\n(")
     above.set(ylabel=f"power on the structure [{unit}]", title=heading(runs, f"powers round the {words}"))
     above.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
-    below.set(xlabel="time over period [-]", ylabel=f"energy of the motion\nabout equilibrium [{e_unit}]", xlim=(0, 1))
+    below.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+    below.set(xlabel="time over period [-]", ylabel=f"energy less its mean [{e_unit}]", xlim=(0, 1))
     return figure
 
 
@@ -147,6 +156,11 @@ def lift_off_of(run):
     status, area = run.series("cycle", "status"), areas_of(run)
     parts = [(status == state) @ area / area.sum() for state in (0, 1)]
     return run.series("cycle", "time") / run.report["cycle"]["period"], *parts, area.sum()
+
+
+def measure_of(run, area):
+    """What parts of a contact are counted by; area: the sum of areas_of."""
+    return "number of pairs" if area == run.report["model"]["pairs"] else f"area of {1e4 * area:.4g} cm²"
 
 
 def open_in_time(run):
@@ -180,8 +194,7 @@ def draw_lift_off(runs):
         if stuck.any() or alone:
             axes.step(phase, 100 * stuck, where="mid", color=STICK if alone else colour(k), ls="-" if alone else ":", lw=1.6,
                       label=label_of(run, runs, "sticking"))
-        words = "number of pairs" if area == len(run.series("cycle", "status").T) else f"area of {1e4 * area:.4g} cm²"
-        axes.set(xlabel="time over period [-]", ylabel=f"part of the contact's {words} [%]", xlim=(0, 1),
+        axes.set(xlabel="time over period [-]", ylabel=f"part of the contact's {measure_of(run, area)} [%]", xlim=(0, 1),
                  title=cycle_words(*(run for run, _ in cycles)).replace(" (", "\n("))
         axes.legend(fontsize=8)
     for k, (run, (time, least, most)) in enumerate(transients):

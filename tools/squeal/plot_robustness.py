@@ -82,5 +82,5 @@ def draw_robustness(runs):
     draw_growth(axes[1], table)
     draw_drivers(axes[2], robustness)
     figure.suptitle(heading([results], f"{robustness['samples']} random samples, "
-                            f"growth checked to {robustness['growth_error']:.1e} of the full problem"))
+                            f"residuals below {robustness['residual']:.1e} in the full problem"))
     return figure

@@ -6,6 +6,7 @@ import matplotlib
 import numpy as np
 from squeal.plot_basis import (RED, SLIP, STICK, cycle_words, heading, length_unit, mode_words, plt, squeal_colours, strongest,
                         those_with)
+from squeal.plot_motion import lift_off_of, measure_of
 from squeal import Missing
 from squeal.surface import amplitude, faces, widest_phase
 
@@ -128,16 +129,17 @@ def show(axes, picture, title):
 
 
 def draw_period(above, below, run):
-    """The probe that swings most, and how many pairs are open and stick, against time over one period of the cycle."""
+    """The probe that swings most, and how much of the contact is open and sticks, against time over one period of the cycle."""
     time = 1e3 * run.series("cycle", "time")  # [ms]
     name, values = strongest(run.probes("cycle"))
     size, unit = length_unit(values)
     above.plot(time, values / size, color=SLIP, lw=1.8)
     above.set(ylabel=f"{name} [{unit}]", title="one period of the limit cycle")
-    below.step(time, run.series("cycle", "open"), where="mid", color=RED, lw=1.6, label="open")
-    below.step(time, run.series("cycle", "stick"), where="mid", color=STICK, lw=1.6, label="sticking")
-    below.set(xlabel="time [ms]", ylabel=f"pairs of {run.report['model']['pairs']}")
-    below.yaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True, min_n_ticks=2))
+    _, opened, stuck, area = lift_off_of(run)
+    below.step(time, 100 * opened, where="mid", color=RED, lw=1.6, label="open")
+    below.step(time, 100 * stuck, where="mid", color=STICK, lw=1.6, label="sticking")
+    below.set(xlabel="time [ms]", ylabel=f"contact's {measure_of(run, area)} [%]")
+    below.set_ylim(bottom=0)
     below.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1), ncol=2, frameon=False)
 
 

@@ -1,7 +1,7 @@
 """Pictures of where squeal may start: modes, estimate, and how the shooting and the branch went."""
 
 import numpy as np
-from squeal.plot_basis import (RED, SLIP, colour, frequency_unit, heading, label_column, label_of, length_unit, mode_words, plt,
+from squeal.plot_basis import (RED, SLIP, colour, frequency_unit, heading, label_column, label_of, legend_below, length_unit, mode_words, plt,
                         those_with)
 from squeal.plot_numbers import axis_label, unit_of_key, words_of
 from squeal import Missing
@@ -17,12 +17,15 @@ def found_modes(run):
 
 
 def symlog_ticks(scale, low, high):
-    """Zero and decades beyond scale, at most six a side: matplotlib's own ones near zero stand on one another's labels."""
+    """Zero and decades beyond scale, at most six a side: matplotlib's own ones near zero stand on one another's labels. A side that
+    reaches scale and has no decade has the number of one digit before its end."""
     ticks = [0.0]
     for end in (low, high):
         first, last = np.ceil(np.log10(2 * scale)), np.floor(np.log10(max(abs(end), 1e-300)))
         sign = np.sign(end)
-        ticks += [sign * 10.0**k for k in np.arange(first, last + 1, max(1, np.ceil((last - first + 1) / 6)))]
+        decades = [sign * 10.0**k for k in np.arange(first, last + 1, max(1, np.ceil((last - first + 1) / 6)))]
+        digit = 10.0 ** np.floor(np.log10(max(abs(end), 1e-300)))
+        ticks += decades or [sign * digit * np.floor(abs(end) / digit + 1e-9)] * (abs(end) >= scale)
     return sorted(set(ticks))
 
 
@@ -55,13 +58,14 @@ def draw_modes(runs):
     if np.abs(growths).max() > 20 * scale:
         axes.set_yscale("symlog", linthresh=scale)
         axes.set_yticks(symlog_ticks(scale, growths.min(), growths.max()))
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
         axes.set_ylabel("growth rate, logarithmic away from 0 [1/s]")
     axes.margins(y=0.12)
     words = f", {found[0][1]['unstable_count']} unstable of {len(found[0][1]['modes'])}" if len(found) == 1 else ""
     if len(points) > LABELS:
         words += f", the {LABELS} that grow fastest labelled"
     axes.set(xlabel=f"frequency [{unit}]", xlim=(0, 1.05 * max(largest / size, 1e-9)), title=heading(runs, f"modes{words}"))
-    axes.legend(fontsize=8)
+    legend_below(figure, {label: handle for handle, label in zip(*axes.get_legend_handles_labels())})  # leaders cross the axes
     order = sorted(range(len(points)), key=lambda k: -points[k][1])[:LABELS]
     if order:
         label_column(axes, [points[k] for k in order], [texts[k] for k in order])

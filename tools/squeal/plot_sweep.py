@@ -1,18 +1,21 @@
-"""Pictures of a sweep: frequency and growth of the followed modes against the number, and a map of stability for two
-numbers; with the motions where they were sought."""
+"""Pictures of a sweep: frequency and growth of the followed modes against the number, and a map of stability for design
+points of two numbers."""
+
+import re
 
 import numpy as np
-from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 from squeal.plot_basis import frequency_unit, heading, label_row, legend_below, plt, scene_of, those_with
 from squeal.plot_numbers import axis_label, value_of, words_of
+from squeal.common import counted
 from squeal import Missing
 
 COLOURS = ["#c0272d", "#1b6ca8", "#d95f02", "#2e8b57", "#7b3fa0", "#b5893a", "#008b8b", "#d6409f"]
 MARKS = "os^Dvp*X"
+DRIVES = re.compile(r"\b(rate|velocity)\b")  # keys that move a rotor
+NAMED = 3  # points that a caption names
 SAME = 0.01  # of its frequency, within which a followed mode is one of the run's own
-SHADES = ["black", "#1b6ca8", "#7b3fa0"]  # of marks on the yellow and red of a map
 
 
 def tables_of(results, sweep):
@@ -26,39 +29,6 @@ def tables_of(results, sweep):
             frequency[place], growth[place] = float(line["frequency_hz"]), float(line["growth_rate"])
     return {"value": np.array([p["values"] for p in points]), "direction": np.array([p["direction"] for p in points]),
             "frequency": frequency, "growth_rate": growth}
-
-
-def motions_of(sweep, direction):
-    """Values and motions of one direction of rotation, by rising numbers."""
-    points = [p for p in sweep["points"] if "motion" in p and p["direction"] == direction]
-    return sorted(((p["values"], p["motion"]) for p in points), key=lambda pair: pair[0])
-
-
-def look_of(motion):
-    """Mark, filling and label of a motion by what is known of it."""
-    if motion["outcome"] == "settled":
-        return "D", "none", "settled motion, no cycle attracts"
-    if motion["stability"] == "stable":
-        return "o", "black", "cycle, attracts"
-    if motion["stability"] == "unstable":
-        return "v", "none", "cycle, repels"
-    return "s", "0.6", "motion, undecided"
-
-
-def draw_motions(above, energy, motions, size):
-    """Frequencies among the modes' and mean energies, with the error of settled motions."""
-    for (value,), motion in motions:
-        if motion["frequency_hz"] is None:
-            continue
-        mark, filling, label = look_of(motion)
-        style = {"marker": mark, "mfc": filling, "mec": "black", "color": "black", "ls": "", "ms": 6, "zorder": 5}
-        above.plot([value], [motion["frequency_hz"] / size], label=label, **style)
-        energy.errorbar([value], [motion["mean_fluctuating_energy"]], yerr=motion["energy_error"] or 0, capsize=2, lw=0.8,
-                        **style)
-
-
-def over_a_decade(values):
-    return max(values) > 10 * min(values) > 0
 
 
 def sweep_of(results):
@@ -197,45 +167,22 @@ def by_stability(points):
             ("unstable", {"color": "0.2"}, [p for p in known if p["unstable_modes"]]))
 
 
-def draw_samples(axes, sweep, size, direction):
-    """Random points of one direction of rotation, through which no mode is followed: the least stable mode."""
-    above, below = axes
-    for label, style, points in by_stability(p for p in sweep["points"] if p["direction"] == direction):
-        x = [p["values"][0] for p in points]
-        above.plot(x, [p["frequency_hz"] / size for p in points], "o", ms=4, label=f"least stable mode, {label}", **style)
-        below.plot(x, [p["growth_rate"] for p in points], "o", ms=4, **style)
-    below.axhline(0, color="0.3", lw=0.8)
-
-
 def draw_chart(results, sweep):
-    """The lock-in chart; of random points the least stable mode alone."""
-    found = [p for p in sweep["points"] if "growth_rate" in p]
+    """The lock-in chart."""
     directions = [d for d in (1, -1) if any(p["direction"] == d for p in sweep["points"])]
-    table = tables_of(results, sweep) if sweep["followed_modes"] else None
-    size, unit = frequency_unit(np.nanmax(table["frequency"]) if table else max(p["frequency_hz"] for p in found))
-    motions = {direction: motions_of(sweep, direction) for direction in directions}
-    rows_of_axes = 3 if any(motion["frequency_hz"] for pairs in motions.values() for _, motion in pairs) else 2
-    figure, axes = plt.subplots(rows_of_axes, len(directions), figsize=(4.2 + 3.6 * len(directions), 3.5 * rows_of_axes),
-                                sharex=True, sharey="row", squeeze=False)
+    table = tables_of(results, sweep)
+    size, unit = frequency_unit(np.nanmax(table["frequency"]))
+    figure, axes = plt.subplots(2, len(directions), figsize=(4.2 + 3.6 * len(directions), 7), sharex=True, sharey="row", squeeze=False)
     for column, direction in enumerate(directions):
-        if table:
-            own = {"run": results.folder.name, "modes": own_modes(results, sweep, table) if direction == 1 else {}}
-            draw_column(axes[:2, column], table, ordered_rows(table, table["direction"] == direction), sweep, size, direction, own)
-        else:
-            draw_samples(axes[:2, column], sweep, size, direction)
-        if rows_of_axes == 3:
-            draw_motions(axes[0, column], axes[2, column], motions[direction], size)
+        own = {"run": results.folder.name, "modes": own_modes(results, sweep, table) if direction == 1 else {}}
+        draw_column(axes[:, column], table, ordered_rows(table, table["direction"] == direction), sweep, size, direction, own)
         axes[-1, column].set_xlabel(labels_of(sweep)[0])
         if len(directions) > 1:
             axes[0, column].set_title("as in the scene" if direction == 1 else "rotation reversed", fontsize=10)
     axes[0, 0].set_ylabel(f"frequency [{unit}]")
     axes[1, 0].set_ylabel("growth rate [1/s]")
-    if rows_of_axes == 3:
-        axes[2, 0].set_ylabel("mean energy of the motion [J]")
-        if over_a_decade([m["mean_fluctuating_energy"] for pairs in motions.values() for _, m in pairs if m["frequency_hz"]]):
-            axes[2, 0].set_yscale("log")
     coloured = list(strongest_tracks(sweep))
-    growth = table["growth_rate"] if table else np.array([p["growth_rate"] for p in found])
+    growth = table["growth_rate"]
     limit_growth(axes[1, 0], growth[:, coloured] if coloured else growth)
     legend = {}
     for column, direction in enumerate(directions):
@@ -248,21 +195,8 @@ def draw_chart(results, sweep):
     return figure
 
 
-def level_between(points, thresholds, fine):
-    """Largest growth rate on a fine grid of the first number, at one value of the second: between points in lines, that leave
-    zero at the threshold where a stable point has an unstable neighbour; unknown beside points that failed."""
-    x = [(p["values"][0], max(p["growth_rate"], 0) if "growth_rate" in p else np.nan) for p in points]
-    for left, right in zip(points, points[1:]):
-        stable = [p["unstable_modes"] == 0 for p in (left, right)]
-        crossed = [t["values"][0] for t in thresholds if left["values"][0] < t["values"][0] < right["values"][0]]
-        if crossed and stable[0] != stable[1]:
-            x.append((min(crossed) if stable[0] else max(crossed), 0.0))
-    x.sort()
-    return np.interp(fine, *zip(*x), left=np.nan, right=np.nan)
-
-
 def level_within(values, growth, count=400):
-    """Largest growth rate on a fine grid, in planes between random points; unknown outside of them. On a grid, since the
+    """Largest growth rate on a fine grid, in planes between the points; unknown outside of them. On a grid, since the
     shaded triangles of a picture overlap where they are thin, and show colours that stand for no value."""
     low, size = values.min(axis=0), np.ptp(values, axis=0)
     parts = np.linspace(0, 1, count)
@@ -274,113 +208,65 @@ def level_within(values, growth, count=400):
     return x, y, np.maximum(level.filled(np.nan), 0)
 
 
-def draw_levels(ax, points, thresholds, limit):
-    """Colours of the largest growth rate. Where the second number has a few values, each has a band, since modes are
-    followed along the first number alone; random points are joined by triangles."""
-    values = np.array([p["values"] for p in points])
-    style = {"cmap": "YlOrRd", "vmin": 0, "vmax": limit}
-    seconds = np.unique(values[:, 1])
-    if len(seconds) > len(points) / 2:
-        found = [p for p in points if "growth_rate" in p]
-        x, y, level = level_within(np.array([p["values"] for p in found]), np.array([p["growth_rate"] for p in found]))
-        if np.isfinite(level).any():
-            ax.pcolormesh(x, y, level, shading="nearest", rasterized=True, **style)
-        return
-    fine = np.linspace(values[:, 0].min(), values[:, 0].max(), 600)
-    middles = (seconds[1:] + seconds[:-1]) / 2
-    edges = np.concatenate([seconds[:1], middles, seconds[-1:]]) if len(seconds) > 1 else [seconds[0] - 0.5, seconds[0] + 0.5]
-    level = [level_between(sorted((p for p in points if p["values"][1] == second), key=lambda p: p["values"][0]),
-                           [t for t in thresholds if t["values"][1] == second], fine) for second in seconds]
-    ends = np.concatenate([fine[:1], (fine[1:] + fine[:-1]) / 2, fine[-1:]])
-    ax.pcolormesh(ends, edges, np.array(level), rasterized=True, **style)
-
-
-def lines_of_thresholds(sweep):
-    """Thresholds of each mode, by rising frequency."""
-    groups = {}
-    for threshold in sorted(sweep["thresholds"], key=lambda t: t["frequency_hz"]):
-        groups.setdefault(threshold["track"], []).append(threshold)
-    return groups
-
-
-def draw_heard(figure, rows, sweep, directions):
-    """Maps of what is heard where modes grow: its frequency, below it its mean energy, in colour."""
-    motions = {direction: motions_of(sweep, direction) for direction in directions}
-    heard = [motion for pairs in motions.values() for _, motion in pairs if motion["frequency_hz"]]
-    size, unit = frequency_unit(max(motion["frequency_hz"] for motion in heard))
-    for axes, key, size, label in ((rows[0], "frequency_hz", size, f"frequency of the motion [{unit}]"),
-                                   (rows[1], "mean_fluctuating_energy", 1, "mean energy of the motion [J]")):
-        values = [motion[key] / size for motion in heard]
-        norm = (LogNorm if over_a_decade(values) else plt.Normalize)(min(values), max(values))
-        for ax, direction in zip(axes, directions):
-            ax.grid(False)
-            ax.plot(*zip(*(p["values"] for p in sweep["points"] if p["direction"] == direction)), ".", ms=3, color="0.75", zorder=0)
-            for at, motion in motions[direction]:
-                if motion["frequency_hz"]:
-                    mark, _, words = look_of(motion)
-                    ax.scatter(*at, c=[motion[key] / size], marker=mark, s=60, norm=norm, cmap="viridis", edgecolors="black",
-                               linewidths=0.8, label=words)
-                else:
-                    ax.plot(*at, "x", ms=6, color="0.4", label=f"no motion found: {motion['outcome']}")
-        figure.colorbar(plt.cm.ScalarMappable(norm, "viridis"), ax=axes, label=label)
-
-
 def draw_map(results, sweep):
-    """Largest growth rate over the plane of two numbers; points as dots, thresholds of a mode have one mark. Below it the
-    motions where they were sought."""
+    """Largest growth rate over the plane of two numbers; points as dots."""
     found = [p for p in sweep["points"] if "growth_rate" in p]
     directions = [d for d in (1, -1) if any(p["direction"] == d for p in found)]
-    with_motions = any(p["motion"]["frequency_hz"] for p in found if "motion" in p)
-    figure, axes = plt.subplots(3 if with_motions else 1, len(directions), sharex=True, sharey=True, squeeze=False,
-                                figsize=(3.4 + 3.6 * len(directions), 11 if with_motions else 5.2))
+    figure, axes = plt.subplots(1, len(directions), sharex=True, sharey=True, squeeze=False, figsize=(3.4 + 3.6 * len(directions), 5.2))
     limit = max(max(p["growth_rate"] for p in found), 1e-12)
     failures = {}
     for ax, direction in zip(axes[0], directions):
         points = [p for p in sweep["points"] if p["direction"] == direction]
+        known = [p for p in points if "growth_rate" in p]
         ax.grid(False)
-        draw_levels(ax, points, thresholds_of(sweep, direction), limit)
+        x, y, level = level_within(np.array([p["values"] for p in known]), np.array([p["growth_rate"] for p in known]))
+        if np.isfinite(level).any():
+            ax.pcolormesh(x, y, level, shading="nearest", rasterized=True, cmap="YlOrRd", vmin=0, vmax=limit)
         for label, style, chosen in by_stability(points):
             ax.plot([p["values"][0] for p in chosen], [p["values"][1] for p in chosen], "o", ms=3, label=label, **style)
         failed = [p for p in points if p["outcome"] != "converged"]
         if failed:
             failures["point that failed"], = ax.plot(*zip(*(p["values"] for p in failed)), "x", ms=6, mew=1.6, color="black")
-        for place, (track, group) in enumerate(lines_of_thresholds(sweep).items()):
-            at = [t["values"] for t in group if t["direction"] == direction]
-            if at:  # of different sizes, since thresholds of two modes may coincide
-                mark, shade = MARKS[1 + place % (len(MARKS) - 1)], SHADES[place // (len(MARKS) - 1) % len(SHADES)]  # a dot is a point
-                mean = np.mean([t["frequency_hz"] for t in group])
-                ax.plot(*zip(*at), ls="", marker=mark, ms=9 - 1.5 * (place % 3), mew=1.2, mec="white", color=shade,
-                        label=f"threshold of mode {track}, {hertz(mean)} Hz")
         ax.use_sticky_edges = False  # points at the edge are seen whole
         ax.margins(0.03)
         if len(directions) > 1:
             ax.set_title("as in the scene" if direction == 1 else "rotation reversed", fontsize=10)
-    figure.colorbar(plt.cm.ScalarMappable(plt.Normalize(0, limit), "YlOrRd"), ax=axes[0], label="largest growth rate [1/s]")
-    if with_motions:
-        draw_heard(figure, axes[1:], sweep, directions)
-    for ax in axes[-1]:
         ax.set_xlabel(labels_of(sweep)[0])
-    for ax in axes[:, 0]:
-        ax.set_ylabel(labels_of(sweep)[1])
-    sought = any("motion" in p for p in found)
-    figure.suptitle(heading([results], "stability" + (" and motions" if with_motions else "; no motion was found" if sought else "")))
+    figure.colorbar(plt.cm.ScalarMappable(plt.Normalize(0, limit), "YlOrRd"), ax=axes[0], label="largest growth rate [1/s]")
+    axes[0, 0].set_ylabel(labels_of(sweep)[1])
+    figure.suptitle(heading([results], "stability"))
     legend_below(figure, {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels())} | failures)
     return figure
 
 
-def signs_of(sweep):
-    """Name and sign of each point's number that has both, such as a speed in both directions; nothing: none has."""
-    for place, key in enumerate(sweep["keys"]):
-        signs = [np.sign(p["values"][place]) for p in sweep["points"]]
-        if min(signs) < 0 < max(signs):
-            return words_of(key, sweep["names"][place]), signs
-    return "", []
+def signs_of(sweep, points):
+    """Name and sign at each point of what turns or pulls the rotor, where both signs occur; nothing: it goes one way."""
+    for place, (key, driven) in enumerate(zip(sweep["keys"], sweep["names"])):
+        if DRIVES.search(f"{key} {driven}"):
+            signs = [np.sign(p["values"][place]) * p["direction"] for p in points]
+            name = words_of(key, driven)
+            break
+    else:
+        signs, name = [p["direction"] for p in points], "rotation"
+    return (name, signs) if signs and min(signs) < 0 < max(signs) else ("", [])
+
+
+def not_counted(sweep):
+    """Sentences about points that are neither quiet nor unstable: nothing touches there, or they failed."""
+    at = lambda p: ", ".join(f"{words_of(key, name)} {value:.5g}" for key, name, value in zip(sweep["keys"], sweep["names"], p["values"]))
+    listed = lambda points, tell: "; ".join(map(tell, points[:NAMED])) + (f"; and {len(points) - NAMED} others" if len(points) > NAMED else "")
+    apart = [p for p in sweep["points"] if p["outcome"] == "converged" and not p.get("closed", 1)]
+    failed = [p for p in sweep["points"] if p["outcome"] != "converged"]
+    found = [f"Nothing touches at {counted(len(apart), 'point')}, not counted: {listed(apart, at)}."] if apart else []
+    reason = lambda p: at(p) + f" ({p.get('reason') or p['outcome']})"
+    return found + ([f"{counted(len(failed), 'point')} failed: {listed(failed, reason)}."] if failed else [])
 
 
 def draw_occurrence(results, sweep):
-    """How many of the points of any numbers squeal, by the frequency of their unstable modes."""
+    """How many of the points of any numbers squeal, by the frequency of their unstable modes. Points where nothing touches are
+    not quiet ones."""
     keys = (*sweep["keys"], "direction")
-    known = [p for p in sweep["points"] if p["outcome"] == "converged"]
+    known = [p for p in sweep["points"] if p["outcome"] == "converged" and p.get("closed", 1)]
     unstable = {}
     for line in results.lines("sweep"):
         if line["growth_rate"] and float(line["growth_rate"]) > 0:
@@ -389,17 +275,20 @@ def draw_occurrence(results, sweep):
     every = [f for own in found for f in own] or [0, 1000]
     size, unit = frequency_unit(max(every))
     edges = np.linspace(0, 1.1 * max(every), 45)
-    name, signs = signs_of({**sweep, "points": known})
+    name, signs = signs_of(sweep, known)
     groups = [(f"{name} above 0", 1), (f"{name} below 0", -1)] if signs else [("", None)]
     figure, ax = plt.subplots(figsize=(8, 4), layout="constrained")
     for (label, sign), colour in zip(groups, COLOURS):
         own = [f for i, f in enumerate(found) if sign is None or signs[i] == sign]
         shares = [100 * sum(any(low <= f < high for f in one) for one in own) / max(len(own), 1) for low, high in zip(edges, edges[1:])]
-        counts = f"{sum(map(bool, own))} of {len(own)} points unstable"
+        counts = f"{sum(map(bool, own))} of {counted(len(own), 'point')} unstable"
         ax.stairs(shares, edges / size, fill=True, alpha=0.6, color=colour, label=f"{label}: {counts}" if label else counts)
-    ax.set(xlabel=f"frequency of unstable modes [{unit}]", ylabel="points [%]", ylim=(0, 100))
+    ax.set(xlabel=f"frequency of unstable modes [{unit}]", ylabel="points that touch [%]", ylim=(0, 100))
     figure.suptitle(heading([results], "occurrence of unstable modes"))
-    legend_below(figure, {label: handle for handle, label in zip(*ax.get_legend_handles_labels())})
+    legend = {label: handle for handle, label in zip(*ax.get_legend_handles_labels())}
+    legend |= {sentence.partition(":")[0]: Line2D([], [], ls="") for sentence in not_counted(sweep)}
+    legend_below(figure, legend)
+    figure.not_counted = not_counted(sweep)
     return figure
 
 

@@ -20,7 +20,7 @@ from squeal.report_style import STYLE
 from squeal.report_tables import number, numbers, paragraph, probability, rotation, strongest, table, text, values_of
 from squeal import Missing
 
-STAGES = ("equilibrium", "modes", "estimate", "response", "transient", "coarse", "cycle", "settled", "attractors", "branch",
+STAGES = ("equilibrium", "modes", "estimate", "response", "transient", "cycle", "settled", "attractors", "branch",
           "sensitivity", "sweep", "robustness")
 FAILED = ("not converged", "no equilibrium", "refused", "collapsed to equilibrium", "not periodic", "unstable cycle", "interrupted")
 

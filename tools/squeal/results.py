@@ -47,10 +47,19 @@ def number_label(key: str, name: str = "", unit: str = "-") -> str:
     return key + (f" ({name})" if name else "") + (f" [{unit}]" if unit != "-" else "")
 
 
+def hertz(frequency: float) -> str:
+    """A frequency with four significant digits, five from 1000 Hz on."""
+    return f"{frequency:.5g} Hz" if 1000 <= abs(frequency) < 1e5 else f"{frequency:.4g} Hz"
+
+
 def read_report(folder: str | Path) -> dict[str, Any]:
     """report.json of a results folder; an error where it cannot be read, or other files are of another run."""
     folder = Path(folder)
     file = folder / "report.json"
+    if not folder.exists():
+        near = [other for other in folder.parent.glob("*") if (other / "report.json").exists()]
+        known = f"; results are in {', '.join(map(str, sorted(near)[:5]))}" if near else ""
+        raise SquealError(f"there is no folder {folder}{known}")
     if not file.exists():
         raise SquealError(f"{folder} has no report.json: it is no results folder, or its run goes on or was killed; "
                           f"what that has is in {folder}/.partial")
@@ -103,10 +112,10 @@ class Results:
     def _answer(name: str, entry: Mapping[str, Any]) -> str:
         """What a stage says first."""
         if name == "modes":
-            unstable = [f"{mode['frequency_hz']:.1f} Hz" for mode in entry.get("modes", []) if mode["unstable"]]
+            unstable = [hertz(mode["frequency_hz"]) for mode in entry.get("modes", []) if mode["unstable"]]
             return f"{len(unstable)} unstable" + (f": {', '.join(unstable[:5])}" if unstable else "")
         if "frequency_hz" in entry:
-            return f"{entry['frequency_hz']:.1f} Hz"
+            return hertz(entry["frequency_hz"])
         return str(entry.get("reason") or "")
 
     @property

@@ -8,7 +8,31 @@ from typing import Any
 import numpy as np
 from squeal.common import SquealError
 
-PLACES = ("file", "folder", "gap_file", "coarse_mesh", "table")  # keys whose texts are files or folders that are read
+PLACES = ("file", "folder", "gap_file", "table")  # keys whose texts are files or folders that are read
+# keys whose values are texts or directions, for which no named number stands
+TEXTS = frozenset("axis axis_1 axis_2 beam bolts direction directions distribution excitation fidelity file fixed folder free gap_file "
+                  "key locked master method motions name normal numbers on part probe rotor save_state section slave stages start stator "
+                  "surfaces table tangents title".split())
+ENDS = ("from", "to")  # names of bodies in tables that join some, numbers in others
+JOINING = ("spring", "connector", "beam")
+
+
+def with_numbers(scene: dict[str, Any]) -> dict[str, Any]:
+    """A scene in which its [numbers] stand in place of their names."""
+    numbers = scene.get("numbers", {})
+    names = numbers | {f"-{name}": -value for name, value in numbers.items()}
+    return {key: _with_names(value, names, key, key) for key, value in scene.items()} if numbers else scene
+
+
+def _with_names(value: Any, names: dict[str, float], key: str, section: str) -> Any:
+    """A value of this key, in a table of this section at the top of the scene."""
+    if isinstance(value, dict):
+        return {inner: _with_names(part, names, inner, section) for inner, part in value.items()}
+    if isinstance(value, list):
+        return [_with_names(part, names, key, section) for part in value]
+    if not isinstance(value, str) or key in TEXTS or key in ENDS and section in JOINING:
+        return value
+    return names.get(value, value)
 
 
 def toml(value: Any) -> str:

@@ -10,6 +10,8 @@ UNITS = {"at": (1, 0), "mass": (-1, 1), "inertia": (1, 1), "stiffness": (-1, 1),
          "slip_compliance": (3, -1), "young": (-2, 1), "shear": (-2, 1), "density": (-4, 1), "area": (2, 0), "bending": (4, 0),
          "torsion": (4, 0), "diameter": (1, 0), "thickness": (1, 0), "displacement": (1, 0), "decay_speed": (1, 0),
          "reach": (1, 0), "gap": (1, 0), "gravity": (1, 0)}
+SINGLE = ("friction", "modes", "damping", "estimate", "mesh")  # tables that there is one of
+BAND = 20000  # [Hz] of a scene that gives none
 TURNING = ("stiffness", "damping")  # whose last three of six have the length twice more
 
 
@@ -24,6 +26,8 @@ class Writer:
         self.length, self.force, self.lines = length, force, []
 
     def value(self, key, given):
+        if isinstance(given, bool):
+            return str(given).lower()
         if isinstance(given, str):
             return text(given)
         if isinstance(given, dict):
@@ -40,7 +44,7 @@ class Writer:
         return f"{given * factor:.14g}"
 
     def table(self, name, keys):
-        self.lines += ["", f"[[{name}]]" if name not in ("friction", "modes", "damping", "mesh") else f"[{name}]"]
+        self.lines += ["", f"[{name}]" if name in SINGLE else f"[[{name}]]"]
         self.lines += [f"{key} = {self.value(key, given)}" for key, given in keys.items()]
 
 
@@ -48,13 +52,11 @@ def skeleton(model, mesh, length, force):
     tables = Tables(model)
     made = tables.make()  # which may add notes and groups
     writer = Writer(length, force)
-    writer.lines = [f"# Made of {model.source.name}. squeal refuses lines with FILL IN: the deck does not say what they need.",
-                    f"title = {text(model.source.stem)}"]
+    writer.lines = [f"title = {text(model.source.stem)}"]
     if model.gravity is not None:
         writer.lines.append(f"gravity = {writer.value('gravity', model.gravity)}")
     writer.lines += ["", "[mesh]", f"file = {text(mesh)}"]
-    writer.lines += [f"scale = {length!r}"] if length != 1 else [
-        "# Of a deck in mm, N and s? Make this again by tools/mesh … --length 0.001 --force 1, which converts moduli too."]
+    writer.lines += [f"scale = {length!r}"] if length != 1 else []
     for note in model.notes:
         writer.lines += ["", f"# Not taken over: {note}"] if note == model.notes[0] else [f"# Not taken over: {note}"]
     groups = [*model.surfaces, *model.node_sets]
@@ -68,18 +70,55 @@ def skeleton(model, mesh, length, force):
     write_loads(model, made, tables.names, writer)
     for slave, master in model.ties:
         writer.table("tie", {"slave": slave, "master": master})
+    write_rotors(model, writer)
     for slave, master, keys in model.contacts:
-        driven = "rotation" in keys or "velocity" in keys
         rotor = {"rotor": slave, "stator": master, "slave": "rotor"} if keys.get("slave") == "rotor" else {
             "rotor": master, "stator": slave}
         writer.table("contact", {**rotor, **{key: of for key, of in keys.items() if key != "slave"}})
-        if not driven:
-            writer.lines.append("# without rotation and velocity it sticks or slips by itself")
+    if not model.contacts and not model.ties:
+        writer.lines += ["", "# The deck has no contact: without one nothing rubs."]
     if any(line.startswith("loss_factor = ") for line in writer.lines):
-        writer.table("damping", {"loss_frequency": "FILL IN [Hz]: where loss factors have their viscous equivalent in time"})
+        write_loss(model, writer)
     if model.band:
         writer.table("modes", {"band": model.band})
-    return "\n".join([*writer.lines, ""])
+    gaps = any("FILL IN [" in line for line in writer.lines)
+    head = f"# Made of {model.source.name}." + (" squeal refuses lines with FILL IN: the deck does not say what they need." if gaps else "")
+    return "\n".join([head, *writer.lines, ""])
+
+
+def is_driven(keys):
+    return "rotation" in keys or "velocity" in keys
+
+
+def write_rotors(model, writer):
+    """Those of the deck. Where contacts rub and nothing moves, the part that has most of their masters' sides, and not their slaves',
+    is one whose drive is a gap; where no part is, they are gaps themselves."""
+    names = {id(part): name for name, part in model.parts.items()}
+    for part, keys in model.rotors:
+        writer.table("rotor", {"part": names[id(part)], **keys})
+    rubbing = [(slave, master) for slave, master, keys in model.contacts if keys.get("friction", 1)]
+    if not rubbing or model.rotors or any(is_driven(keys) for *_, keys in model.contacts):
+        return
+    nodes = {name: {n for label in part.elements for n in model.elements[label][1]} for name, part in model.parts.items()}
+    side = lambda name: {n for face in model.surfaces.get(name, ()) for n in face}
+    count = {name: sum(bool(side(master)) and side(master) <= own and not side(slave) <= own for slave, master in rubbing)
+             for name, own in nodes.items()}
+    part = max(count, key=count.get)
+    if count[part]:
+        writer.lines += ["", "# The deck moves nothing. Take this table out where contacts stick or slip by themselves."]
+        writer.table("rotor", {"part": part, "velocity": "FILL IN [m/s]: such as [1, 0, 0]; or in its place axis = 'z' and rate = 10 [rad/s]"})
+        return
+    for *_, keys in model.contacts:
+        if keys.get("friction", 1):
+            keys["velocity"] = "FILL IN [m/s]: such as [1, 0, 0]; or take this key out where the contact sticks or slips by itself"
+
+
+def write_loss(model, writer):
+    """Modes have their loss factors at any frequency. The estimate is off, for which the middle of the band would be a guess."""
+    writer.table("damping", {"loss_frequency": model.loss_frequency or (model.band or BAND) / 2})
+    if not model.loss_frequency:
+        writer.lines[-1] += "  # the middle of the band: modes need none; give the squeal's before a cycle, a transient or the estimate is asked for"
+        writer.table("estimate", {"enabled": False})
 
 
 def write_groups(model, writer):
@@ -116,14 +155,15 @@ def write_loads(model, made, names, writer):
 
 def material(model, part):
     known = model.materials.get(part.material, {}) if part.material else {}
+    lacks = f"the deck has no material {part.material}" if part.material and part.material not in model.materials else "the deck has none"
     keys = {}
     if "orthotropic" in known:
         keys["orthotropic"] = {**known["orthotropic"], **(part.axes or {})}
     else:
         for key, unit in (("young", "Pa"), ("poisson", "-")):
             missing = key not in known or (known[key] == 0 and key != "poisson")
-            keys[key] = f"FILL IN [{unit}]: the deck has none" if missing else known[key]
-    keys["density"] = known["density"] if known.get("density") else "FILL IN [kg/m3]: the deck has none"
+            keys[key] = f"FILL IN [{unit}]: {lacks}" if missing else known[key]
+    keys["density"] = known["density"] if known.get("density") else f"FILL IN [kg/m3]: {lacks}"
     damping = {**known, "loss_factor": known.get("loss_factor", 0) + model.loss_factor}
     keys |= {key: damping[key] for key in ("loss_factor", "alpha", "beta") if damping.get(key)}
     if model.elements[part.elements[0]][0] not in KINDS:

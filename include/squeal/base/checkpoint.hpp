@@ -95,9 +95,6 @@ struct CheckpointPlace
 /// Sets the place of this run. Error: the checkpoints to go on from are of another request.
 void open_checkpoints(const CheckpointPlace& place);
 
-/// While one lives, none is kept or read: for work that repeats stages of the run with other numbers.
-Finally without_checkpoints();
-
 /// Writes a checkpoint under a name, whole or not at all. A disk that is full is a warning: the run is worth more.
 /// Collective.
 void keep(const std::string& name, MPI_Comm comm, const Description& describe);

@@ -28,26 +28,12 @@ struct SlidingStability
   std::vector<BranchEvent> hopf{};                // where modes become unstable or stable, with the frequency of each
 };
 
-/// A range of the parameter.
-struct ParameterRange
-{
-  double from = 0, to = 0;
-};
-
-/// A point of a reduced model's branch, and the full model's cycle next to it at the same value.
-struct CorrectedPoint
-{
-  std::size_t place = 0;            // among the points
-  std::optional<BranchPoint> orbit; // none: no cycle was found there
-};
-
 /// What a branch was followed on where that was not the full model.
 struct BranchReduction
 {
   int shapes = 0, active_pairs = 0;
   int missed_pairs = 0;           // which the full model's periods saw do what the reduced one leaves out
   double interpolation_error = 0; // [-] of the matrices between the samples
-  std::vector<CorrectedPoint> corrections;
 };
 
 /// outcome: "converged" (both sides came to a bound, to first lift-off or to a Hopf point), "not converged" (how far
@@ -57,7 +43,6 @@ struct BrakeBranch
   Outcome outcome;
   Branch branch;                                // its events include those of the equilibrium
   std::vector<EquilibriumStability> equilibria; // by rising parameter
-  std::vector<ParameterRange> coexistence;      // of a stable cycle and a stable equilibrium
   std::optional<BranchReduction> reduction;     // of a branch on a reduced model
   std::string not_reduced;                      // why none serves a large model, where one was tried
 };

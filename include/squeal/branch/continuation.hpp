@@ -116,11 +116,6 @@ struct ContinuationSettings
   int steps = 0;                  // of the flow's grid of time a period; 0: it has none
 };
 
-/// The orbit of this value that closes near `start`, without its multipliers; none where none does. Collective. Error:
-/// as of the family.
-std::optional<BranchPoint> close_orbit(const FlowFamily& family, const ContinuationSettings& settings,
-                                       const ShootingOptions& options, const Orbit& start, double parameter);
-
 /// The branch through the orbit of the value `parameter` that closes near this one; without points where none does.
 /// Collective. Error: as of the family.
 Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settings, const ShootingOptions& options,

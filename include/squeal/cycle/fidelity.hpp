@@ -55,9 +55,6 @@ struct FittedCycle
   bool answers = true; // false: the full model follows, fidelity.reason says why
 };
 
-/// The settings, with steps and tolerance where the scene leaves them open.
-CycleSettings chosen_settings(const CycleProblem& problem, const FidelityRequest& request);
-
 /// Why no reduced model leads to the cycle that "auto" seeks; empty if one may. Not collective.
 std::string no_reduced_search(const CycleProblem& problem);
 

@@ -32,6 +32,8 @@ struct LimitCycle
   std::vector<OffsetSpread> spreads{}; // over the offsets that joints hold; where the whole tangent is cheap
 };
 
+struct ReducedModel;
+
 /// An orbit near a cycle, of a search that was ended before.
 struct ResumedOrbit
 {
@@ -50,10 +52,11 @@ struct CycleProblem
   const StepOptions& step;
   const ModesOptions& modes_options; // of real modes beyond the band
   Mat probes = nullptr;
-  const State* given = nullptr;          // where CycleStartKind::transient, ::coarse and ::file start
+  const State* given = nullptr;          // where CycleStartKind::transient and ::file start
   double given_period = 0;               // [s] of the cycle that is given; 0: none is, and the mode's is taken
   int given_rounds = 1;                  // as many as that period may be of the cycle
   const ResumedOrbit* resumed = nullptr; // where shooting at the full model goes on, whatever it started from
+  const ReducedModel* reduced = nullptr; // whose cycle it starts from
 };
 
 /// The problem with other settings, which it borrows.

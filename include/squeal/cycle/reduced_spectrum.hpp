@@ -32,7 +32,7 @@ inline constexpr LargeValues deciding_values{0.85, 4, 48};
 inline constexpr LargeValues projected_values{0.85, 4, 24};
 
 /// Collective among the map's ranks.
-ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const StepRecord> contacts,
                                   const LargeValues& wanted);
 
 /// The projected values of the spectrum, their vectors and the resolvent for motions that have these coordinates in the
@@ -51,6 +51,6 @@ void add_changes(const std::vector<std::complex<double>>& others, double part, S
 /// The multipliers that these vectors give on other contact or with other steps: eigenvalues of (L'R)^-1 L'Phi R, in
 /// the order of the spectrum's values. Collective among the map's ranks.
 std::vector<std::complex<double>> multipliers_along(const ReducedSpectrum& spectrum, ReducedMap& map, double period,
-                                                    std::span<const RecordedContact> contacts);
+                                                    std::span<const StepRecord> contacts);
 
 } // namespace squeal

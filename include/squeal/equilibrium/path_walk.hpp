@@ -39,12 +39,15 @@ struct PathWalk
   std::size_t step = 0;         // that the walk is in
   double part = 0;              // [-] of it
   int increments = 0, iterations = 0;
+  StickSlipState rate{}; // of the state, by the part of the step: slips from nothing; empty: not known
+  std::vector<StickSlipState> first_rates{}; // that of each step's first increment
   double change = 0;       // [-] of reactions, over the largest of their contact, from half as many increments
   double largest_move = 0; // [m] of a row in one increment, the first of the path aside
 };
 
-/// Walks along the path, with increments halved until reactions change by less than a thousandth. A load in proportion
-/// from closed gaps takes one: the problem has no scale.
+/// Walks along the path. An increment starts from the state that the last one's rate leads to. Increments grow from the
+/// start of a step on, where a new load turns slips, and are halved until reactions change by less than a thousandth. A
+/// load in proportion from closed gaps takes one: the problem has no scale.
 PathWalk walk_path(const PathProblem& problem);
 
 /// The state under the whole load with its pairs stuck where they are: one increment from reactions r and slips w that

@@ -48,9 +48,6 @@ struct ContactPairs
 /// nowhere within reach of each other, look the same way or are inside each other. The mesh must be whole.
 ContactPairs make_pairs(const Mesh& mesh, const Scene& scene);
 
-/// Gives every rank the pairs that rank 0 has. Collective.
-void broadcast_pairs(ContactPairs& contact, MPI_Comm comm);
-
 /// Owner of each node and of each element.
 struct Partition
 {

@@ -1,8 +1,8 @@
 #pragma once
 /// Ties of surfaces whose meshes need not match: the bilateral form of the pairs' rows (src/README.md, section 1.9).
 /// The row of slave node i,  sum of slave weights u = sum of c_ij u_j,  is solved for u_i, so that a tie is an exact
-/// constraint. The nodes of a shell's edge follow the solid element behind the master that they touch. A mid-side of a
-/// solid on an edge that a shell shares follows the edge's ends, between which the shell is linear.
+/// constraint. A mid-side of a solid on an edge that a shell shares follows the edge's ends, between which the shell is
+/// linear.
 #include "squeal/mesh/contact_pairs.hpp"
 
 namespace squeal
@@ -14,8 +14,7 @@ struct TiedNode
 {
   int node = 0, tie = 0; // tie: index in Scene::ties; -1 of a mid-side on the edge of a shell
   std::vector<PairNode> others;
-  Vec3 arm{};                    // [m] from the mean of the others' places to the node's
-  std::vector<Vec3> gradients{}; // [1/m] of the weights: theta = 1/2 sum of gradient x u_node; empty: theta is its own
+  Vec3 arm{}; // [m] from the mean of the others' places to the node's
 };
 
 /// The slave nodes of all ties, and the mid-sides on edges of shells.
@@ -26,8 +25,8 @@ struct TiedNodes
 };
 
 /// A slave node of a surface below a tenth of its uncovered area is left free. Throws Error for a missing surface and
-/// for surfaces that share nodes or do not meet, and for a node of an edge that is beyond the reach. It does so for a
-/// node that is tied twice, and for a slave node that is on the master of a tie. The mesh must be whole.
+/// for surfaces that share nodes or do not meet. It does so for a node that is tied twice, and for a slave node that is
+/// on the master of a tie. The mesh must be whole.
 TiedNodes tied_nodes(const Mesh& mesh, const Scene& scene);
 
 } // namespace squeal

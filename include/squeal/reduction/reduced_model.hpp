@@ -39,6 +39,7 @@ struct ReducedModel
   Eigen::MatrixXd M_z, C_z, K_z;                  // symmetric: V'Z'M Z V ..., of the energies
   Eigen::LLT<Eigen::MatrixXd> E_factor, M_factor; // of K_z + omega^2 M_z, M_z
   std::vector<int> active;                        // pairs, ascending
+  std::vector<char> sliding;                      // by pairs: closed throughout, eliminated; the others stay open
   int directions = 2;                             // tangential ones of an active pair; 0: friction follows
   PairFriction friction;                          // of the active pairs
   std::vector<double> gap;                        // [m] at equilibrium, per active pair
@@ -79,12 +80,15 @@ inline constexpr PetscInt all_attachments = std::numeric_limits<PetscInt>::max()
 /// columns, 200 after 121 and 80 after 101. The brake of 239 246 needs 82 from 300 of 2997.
 inline constexpr PetscInt attachments_on_recorded_contact = 300;
 
+/// Of its modes, those that are kept apart: what they change says what those beyond them may.
+inline constexpr double kept_apart = 0.25;
+
 /// How a model is reduced.
 struct Reduction
 {
   PetscInt modes = 0;      // complex modes taken, nearest in frequency to the followed one, which is the first of all
   double threshold = 1e-5; // an attachment shape is dropped when less than this part of it is new
-  PetscInt attachments = all_attachments; // the leading ones taken at most; 0: what the free memory has room for
+  PetscInt attachments = all_attachments; // the leading ones taken at most, as far as the free memory has room
   bool sliding = false;                   // the active pairs slide along the drive throughout
   const RealModes* real = nullptr;        // frictionless ones; those above the complex modes are taken, too. Null: none
   FactorOptions factor{};

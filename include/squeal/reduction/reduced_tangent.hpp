@@ -9,30 +9,23 @@
 namespace squeal
 {
 
-/// The contact of the active pairs in one step. The step's tangent on it is linear (src/README.md, section 4.13).
-struct RecordedContact
-{
-  Eigen::VectorXd r, w;            // [N, m/s] contact vectors: reactions, contact velocity
-  std::vector<char> opposes_theta; // by pairs
-};
-
 /// The contact of each step of a period.
-std::vector<RecordedContact> record_contacts(ReducedMap& map, double period, ReducedState state);
+std::vector<StepRecord> record_contacts(ReducedMap& map, double period, ReducedState state);
 
 /// The same of the full model's recorded steps, as the reduced model sees them.
-std::vector<RecordedContact> recorded_contacts(const ReducedModel& model, int directions,
-                                               std::span<const StepRecord> records);
+std::vector<StepRecord> recorded_contacts(const ReducedModel& model, int directions,
+                                          std::span<const StepRecord> records);
 
 /// Columns of changes of the start, (q, v), to those of the period's end: the product of the steps' own tangents on the
 /// recorded contact. Each rank does its share of the columns, and factors the contact of its share of the steps.
-Eigen::MatrixXd apply_tangent(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+Eigen::MatrixXd apply_tangent(ReducedMap& map, double period, std::span<const StepRecord> contacts,
                               const Eigen::MatrixXd& columns);
 
 /// Columns x to (dPhi/dx)'x.
-Eigen::MatrixXd apply_adjoint(ReducedMap& map, double period, std::span<const RecordedContact> contacts,
+Eigen::MatrixXd apply_adjoint(ReducedMap& map, double period, std::span<const StepRecord> contacts,
                               const Eigen::MatrixXd& columns);
 
 /// The derivative of a period's end (q, v) in the coordinates q and v of the slow shapes.
-Eigen::MatrixXd monodromy(ReducedMap& map, double period, std::span<const RecordedContact> contacts);
+Eigen::MatrixXd monodromy(ReducedMap& map, double period, std::span<const StepRecord> contacts);
 
 } // namespace squeal

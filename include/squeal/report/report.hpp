@@ -53,18 +53,6 @@ struct Timing
   double processor_seconds = 0; // of rank 0, its waiting for others included: a busy machine does not stretch it
 };
 
-/// The cycle on the coarser mesh that the search starts from.
-struct CoarseStart
-{
-  Outcome outcome{OutcomeKind::off, "the scene has no cycle.start = \"coarse\"", 0, 0}; // of the cycle there
-  PetscInt dofs = 0;
-  int pairs = 0;
-  double period = 0;                   // [s]
-  double mean_fluctuating_energy = 0;  // [J]
-  long periods = 0;                    // integrated
-  std::optional<GivenStart> carried{}; // on the scene's own mesh
-};
-
 /// A bolt at the equilibrium.
 struct BoltResult
 {
@@ -91,7 +79,6 @@ struct Report
   std::vector<BoltResult> bolts;          // at the equilibrium
   Response response;
   Trajectory transient;
-  CoarseStart coarse;
   Motion motion;
   Attractors attractors;
   BrakeBranch branch;
@@ -108,7 +95,7 @@ const Estimate& followed_estimate(const Report& report);
 std::vector<double> closed_reactions(const Equilibrium& equilibrium);
 
 /// The outcome of every stage but the model, in the order in which they run.
-std::array<std::pair<Stage, Outcome>, 13> outcomes_of(const Report& report);
+std::array<std::pair<Stage, Outcome>, 12> outcomes_of(const Report& report);
 
 /// One sentence that says what is heard, and whether it lasts: the first row of the table. Of rank 0, as the four
 /// below.

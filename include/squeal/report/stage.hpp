@@ -16,7 +16,6 @@ enum class Stage
   estimate,
   response,
   transient,
-  coarse,
   cycle,
   settled,
   attractors,
@@ -27,7 +26,7 @@ enum class Stage
 };
 
 template <> inline constexpr std::array words_of<Stage> = {
-    "model", "equilibrium", "modes",      "estimate", "response",    "transient", "coarse",
-    "cycle", "settled",     "attractors", "branch",   "sensitivity", "sweep",     "robustness"};
+    "model",   "equilibrium", "modes",  "estimate",    "response", "transient", "cycle",
+    "settled", "attractors",  "branch", "sensitivity", "sweep",    "robustness"};
 
 } // namespace squeal

@@ -57,24 +57,13 @@ struct Material
   std::optional<Orthotropy> orthotropy{}; // instead of young and poisson; of solids
 };
 
-/// A damping ratio that was measured on a mode.
-struct MeasuredRatio
-{
-  double frequency_hz = 0;
-  double ratio = 0; // [-]
-};
-
 /// Rayleigh damping C = alpha M + beta K.
 struct RayleighDamping
 {
   double alpha = 0;          // [1/s]
   double beta = 0;           // [s]
   double loss_frequency = 0; // [Hz] at which loss factors have their viscous equivalent in time; of the scene alone
-  std::vector<MeasuredRatio> measured{}; // rising frequency; alpha and beta are fitted to them; of the scene alone
 };
-
-/// The damping ratio of a mode at a frequency [-], alpha/(2 omega) + beta omega/2.
-double damping_ratio_at(const RayleighDamping& damping, double frequency_hz);
 
 /// A rotation about a fixed axis.
 struct Rotation
@@ -315,7 +304,7 @@ struct Rotor
 /// Two surfaces of parts meshed apart that move as one; nodes of the slave follow the master.
 struct Tie
 {
-  std::string slave;  // named surface, the finer or softer one, or curve, the edge of a shell
+  std::string slave;  // named surface, the finer or softer one
   std::string master; // named surface
   double reach = 0;   // [m] largest distance of the surfaces along the normal
 };

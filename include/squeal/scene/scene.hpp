@@ -74,11 +74,10 @@ enum class CycleStartKind
   estimate,  // the unstable modes at their estimated amplitudes
   mode,      // the unstable mode at a given amplitude
   transient, // the end of the run's own transient
-  coarse,    // the cycle of the same scene on a coarser mesh
   file,      // a state file
 };
 
-template <> inline constexpr std::array words_of<CycleStartKind> = {"estimate", "mode", "transient", "coarse", "file"};
+template <> inline constexpr std::array words_of<CycleStartKind> = {"estimate", "mode", "transient", "file"};
 
 /// Where the search for the cycle starts, with its file.
 struct CycleStart
@@ -92,10 +91,9 @@ struct ModesSettings
 {
   bool enabled = true;
   ModesMethod method = ModesMethod::automatic;
-  int real_modes = 0;            // [-] number of real modes of the projection; 0: those below the band
-  int residual_passes = 3;       // [-] number of corrections of the projection
-  double band = 20000;           // [Hz] modes below this frequency are reported
-  bool reduced_matrices = false; // the brake reduced to them and to the pairs' attachments is written as matrices
+  int real_modes = 0;      // [-] number of real modes of the projection; 0: those below the band
+  int residual_passes = 3; // [-] number of corrections of the projection
+  double band = 20000;     // [Hz] modes below this frequency are reported
 };
 
 /// Settings of the energy estimate.
@@ -135,15 +133,13 @@ struct CycleSettings
 {
   bool enabled = false;
   CycleStart start;
-  double amplitude = 0; // [m] largest displacement of the mode at CycleStartKind::mode; 0: twice lift-off
-  std::map<std::string, double> coarse_parameters; // of CycleStartKind::coarse: of the geometry, instead of the mesh's
-  std::filesystem::path coarse_mesh;               // or a mesh or geometry of its own; absolute
-  int steps_per_period = 0;                        // [-] 0: chosen
-  double tolerance = 0;                            // [-] on the residual of the full state; 0: chosen
-  int free_periods = 10;                           // [-] number of periods integrated before the first Newton step
-  int starts = 0;                                  // [-] number of starts whose motions are listed; 0: chosen
-  double theta = 0.5;                              // [-] of the theta method
-  std::filesystem::path save_state;                // state file of the start of the cycle; none if empty
+  double amplitude = 0;             // [m] largest displacement of the mode at CycleStartKind::mode; 0: twice lift-off
+  int steps_per_period = 0;         // [-] 0: chosen
+  double tolerance = 0;             // [-] on the residual of the full state; 0: chosen
+  int free_periods = 10;            // [-] number of periods integrated before the first Newton step
+  int starts = 0;                   // [-] number of starts whose motions are listed; 0: chosen
+  double theta = 0.5;               // [-] of the theta method
+  std::filesystem::path save_state; // state file of the start of the cycle; none if empty
 };
 
 /// The branch of the limit cycle along a number of the scene.
@@ -152,7 +148,6 @@ struct BranchSettings
   std::string key;         // of the number, as overrides name it
   double from = 0, to = 0; // in the key's unit
   int points = 30;         // [-] number of points if the number alone changed along the branch
-  int corrections = 0;     // [-] number of points of a reduced model's branch that the full one corrects
   double own = 0;          // the scene's own value of the number, which the branch starts from; no key of its own
 };
 
@@ -170,22 +165,19 @@ enum class SweepStages
 {
   equilibrium,
   modes,
-  cycle, // or the settled motion, where modes grow
 };
 
-template <> inline constexpr std::array words_of<SweepStages> = {"equilibrium", "modes", "cycle"};
+template <> inline constexpr std::array words_of<SweepStages> = {"equilibrium", "modes"};
 
-/// Stability at many values of one number of the scene, or of two.
+/// Stability at many values of one number of the scene, or at design points.
 struct SweepSettings
 {
-  std::vector<std::string> key;              // of the numbers, as overrides name them
-  std::vector<double> from, to;              // in the keys' units, one a key
-  std::vector<int> points{11};               // [-] of the grid, one a key
-  std::vector<double> values;                // of a single key, instead of a grid
+  std::vector<std::string> key;              // of the number, as overrides name it; of a table all of them
+  double from = 0, to = 0;                   // in the key's unit
+  int points = 11;                           // [-] of the grid
+  std::vector<double> values;                // instead of a grid
   std::filesystem::path table{};             // CSV file of design points instead, a column a key; absolute
   std::vector<std::vector<double>> design{}; // its points; no key of its own
-  int samples = 0;                           // [-] number of random points of the ranges, instead of a grid; 0: none
-  int seed = 1;                              // [-] of the random points
   SweepDirections directions{};              // of rotation
   SweepStages stages = SweepStages::modes;
 };
@@ -209,7 +201,6 @@ struct Change
 struct RobustnessSettings
 {
   int samples = 1000;       // [-] number of random scenes
-  int checks = 20;          // [-] number of them that are computed by the full problem as well
   int seed = 1;             // [-] of the random numbers
   double confidence = 0.95; // [-] of the intervals of the probabilities
 };

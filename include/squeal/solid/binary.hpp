@@ -5,7 +5,6 @@
 /// first. All functions are collective; an Error names the file and is thrown by every rank.
 #include "squeal/base/petsc.hpp"
 
-#include <Eigen/Core>
 #include <filesystem>
 #include <iosfwd>
 #include <optional>
@@ -42,8 +41,5 @@ std::vector<double> read_vector_entries(std::istream& stream, PetscInt length);
 
 /// Appends a vector with its header.
 void append_vector(const std::vector<double>& entries, std::string& bytes);
-
-/// Appends a matrix with its header, every entry of it.
-void append_matrix(const Eigen::MatrixXd& entries, std::string& bytes);
 
 } // namespace squeal

@@ -15,23 +15,19 @@ namespace squeal
 /// What each free degree of freedom is. Texts are made on demand only, since a model has many degrees of freedom.
 struct DofNames
 {
-  // On rank 0; on a matrix scene none:
+  // Of a mesh:
   std::vector<std::string> bodies; // "part disc", "point tip", "rigid body carrier"
   std::vector<int> body;           // index in `bodies` of each node
   std::vector<Vec3> at;            // [m] position of each node
-  // On every rank:
-  std::vector<PetscInt> nodal_dof; // of each free degree of freedom, in the whole mesh; empty on a matrix scene
+  std::vector<PetscInt> nodal_dof; // of each free degree of freedom; empty on a matrix scene
   // On a matrix scene, of each free degree of freedom:
   std::vector<PetscInt> file_rows;      // row of the files
   std::vector<NodeMotion> file_motions; // empty without dofs.txt
 };
 
 /// Returns "part disc, node 12 at (x, y, z), direction ry", or "dof 12 (node 1017, x)" on a matrix scene. Not
-/// collective; the names must be whole.
+/// collective.
 std::string describe(const DofNames& names, PetscInt dof);
-
-/// By rank 0's names. Collective.
-std::string describe(const DofNames& names, PetscInt dof, MPI_Comm comm);
 
 /// An entry of a row of T.
 struct DofTerm
@@ -40,8 +36,7 @@ struct DofTerm
   double factor = 0; // [-, m]
 };
 
-/// The rows of T of the nodes of a mesh, or of a piece of it. Both nodes of a contact pair have their degrees of
-/// freedom on one rank.
+/// The rows of T of the nodes of a mesh. Both nodes of a contact pair have their degrees of freedom on one rank.
 struct DofMap
 {
   PetscInt size = 0;                // number of free degrees of freedom on all ranks
@@ -50,8 +45,7 @@ struct DofMap
   std::vector<std::size_t> offsets; // of each nodal degree of freedom in `terms`, and the end
   std::vector<DofTerm> terms;
   DofNames names;
-  std::vector<double>
-      shift{}; // [m, rad] of each nodal degree of freedom beside T q: by supports, on rank 0; empty: none
+  std::vector<double> shift{}; // [m, rad] of each nodal degree of freedom beside T q: by supports; empty: none
 
   /// The motion of a nodal degree of freedom by supports, whatever q is [m, rad].
   double shift_of(PetscInt nodal_dof) const { return shift.empty() ? 0 : shift[static_cast<std::size_t>(nodal_dof)]; }
@@ -66,18 +60,12 @@ struct DofMap
 /// rigid body that contradicts another, and if nothing is free.
 DofMap number_dofs(const Mesh& mesh, const Scene& scene, const Partition& partition, MPI_Comm comm);
 
-/// Elements with their nodes and rows of T: the whole mesh on rank 0. On another rank those that it assembles and those
-/// that share a degree of freedom with it, without named sets; nodes and elements are numbered within the piece.
-struct MeshPiece
+/// A mesh with its numbering. Every rank has the whole of it.
+struct NumberedMesh
 {
   Mesh mesh;
-  Partition partition; // node_rank: on rank 0 alone
-  DofMap dofs;
-  std::vector<int> node_numbers{}, element_numbers{}; // in the whole mesh, ascending; empty: the same
+  Partition partition{};
+  DofMap dofs{};
 };
-
-/// Gives every other rank its piece of the mesh that rank 0 has numbered: what its rows of the matrices need, in the
-/// order of the whole. Collective.
-void distribute(MeshPiece& piece, MPI_Comm comm);
 
 } // namespace squeal

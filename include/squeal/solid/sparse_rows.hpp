@@ -11,10 +11,6 @@ using SparseRow = std::map<PetscInt, double>; // coefficient of each free degree
 /// Adds direction . u(node) to a row.
 void add_displacement(const DofMap& dofs, int node, const Vec3& direction, SparseRow& row);
 
-/// Scatters rank 0's rows, the same number for each of `count` items: each rank gets those of the items in its local
-/// range. Collective.
-std::vector<SparseRow> scattered_rows(std::vector<SparseRow> rows, PetscInt count, MPI_Comm comm);
-
 /// Returns the AIJ matrix with this rank's rows. Collective.
 Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_columns, MPI_Comm comm);
 
@@ -31,7 +27,7 @@ std::pair<PetscInt, PetscInt> range_of(PetscInt count, PetscInt rank, PetscInt r
 std::vector<int> probed_nodes(const std::vector<Probe>& probes, const Mesh& mesh);
 
 /// Returns the matrix P with a row for each probe: the values of the probes are P q. Values are displacements [m].
-/// Collective; rank 0 has the mesh and T whole. Throws Error for a node that is not there, is not the only one or
+/// Collective. Throws Error for a node that is not there, is not the only one or
 /// cannot move.
 Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const DofMap& dofs, MPI_Comm comm);
 

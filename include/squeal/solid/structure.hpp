@@ -47,16 +47,16 @@ struct Structure
   DofNames names;
 };
 
-/// Returns the structure of a mesh or point scene, of which this rank has a piece. Collective. Throws Error for an
-/// element whose Jacobian is not positive, with its part and place.
-Structure assemble(const MeshPiece& piece, const Scene& scene, MPI_Comm comm);
+/// Returns the structure of a mesh or point scene. Collective. Throws Error for an element whose Jacobian is not
+/// positive, with its part and place.
+Structure assemble(const NumberedMesh& numbered, const Scene& scene, MPI_Comm comm);
 
-/// Returns the load T' f of the scene's forces and pressures [N, N m]. Collective; rank 0 has the mesh and T whole.
+/// Returns the load T' f of the scene's forces and pressures [N, N m]. Collective.
 Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const DofMap& dofs, MPI_Comm comm);
 
 /// Sets the preload by gravity and by the motions that supports prescribe, T' (M a - K u_s), and the sections of the
 /// bolts, not yet tightened. Collective. Throws Error for a section that does not cut through.
-void assemble_preload(Structure& structure, const MeshPiece& piece, const Scene& scene, MPI_Comm comm);
+void assemble_preload(Structure& structure, const NumberedMesh& numbered, const Scene& scene, MPI_Comm comm);
 
 /// The tension of a bolt at u [N]. Collective.
 double tension_of(const TightBolt& bolt, Vec u);

@@ -1,6 +1,6 @@
 #pragma once
 /// How likely modes are unstable where numbers of the scene are random (src/README.md, section 12). Samples are points
-/// of a sweep, on one basis that they share (section 10.2). Full models of some are the check.
+/// of a sweep, on one basis that they share (section 10.2), each checked by its residual in the full problem.
 #include "squeal/study/sweep.hpp"
 
 namespace squeal
@@ -18,17 +18,8 @@ struct Probability
 /// The probability of an event that `count` of the samples show. Arithmetic of one rank.
 Probability probability_of(int count, int samples, double confidence);
 
-/// Of all samples. growth_rate, frequency_hz and mode are of the mode with the greatest growth rate over |lambda|.
-struct RobustSample
-{
-  std::vector<double> values; // of the random numbers
-  bool known = false;         // there is an equilibrium
-  int closed = 0;             // pairs
-  int unstable = 0;           // modes in the band
-  double growth_rate = 0;     // [1/s] 0 without a mode in the band
-  double frequency_hz = 0;
-  int mode = -1; // which mode of the reference it is, if it is unstable
-};
+/// The mode of a sample with the greatest growth rate over |lambda|. The sample must have one.
+const SweptMode& least_stable(const SweepPoint& sample);
 
 /// A mode of the reference, where all numbers have their median, and the unstable modes of the samples that it is.
 struct RobustMode
@@ -40,24 +31,14 @@ struct RobustMode
   std::vector<double> frequencies;  // [Hz] ascending, likewise
 };
 
-/// A sample computed by the full problem as well. Errors are over |lambda|, at the unstable modes of either side.
-struct RobustCheck
-{
-  int sample = 0;
-  bool known = false; // the full problem converged
-  int unstable = 0, unstable_reduced = 0;
-  double growth_error = 0, frequency_error = 0;
-};
-
-/// outcome: "converged", "not converged" (samples or checks failed: how many, the first reason), "off". residual: the
-/// largest growth error. iterations: number of samples.
+/// outcome: "converged", "not converged" (samples failed: how many, the first reason), "off". residual: the largest
+/// backward error. iterations: number of samples.
 struct Robustness
 {
   Outcome outcome;
-  std::vector<RobustSample> samples;
-  std::vector<RobustMode> modes; // those that are unstable in a sample, falling probability
-  Probability any;               // at least one unstable mode
-  std::vector<RobustCheck> checks;
+  std::vector<SweepPoint> samples; // the track of a mode is its number in the reference
+  std::vector<RobustMode> modes;   // those that are unstable in a sample, falling probability
+  Probability any;                 // at least one unstable mode
   std::vector<double> correlation; // of each number with the largest growth ratio: Spearman's
   int basis = 0;                   // shapes in the end
 };
@@ -67,14 +48,14 @@ struct RobustnessProblem
 {
   const RobustnessSettings& settings;
   const std::vector<UncertainNumber>& numbers;
-  std::function<BrakeModel(std::span<const double> values, MPI_Comm comm)> model_at; // on MPI_COMM_SELF
+  std::function<BrakeModel(std::span<const double> values, MPI_Comm comm)> model_at;
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;
-  double accuracy = 0; // of growth rates over |lambda|, as a part of their scatter
+  const SweepOptions& options;
 };
 
-/// Every rank computes samples of its own. Collective.
+/// Groups of ranks compute samples of their own. Collective.
 Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm);
 
 } // namespace squeal

@@ -1,18 +1,15 @@
 #pragma once
-/// Stability of sliding at many values of one or two numbers of the scene, with the modes followed from value to value
+/// Stability of sliding at many values of numbers of the scene, with the modes followed from value to value
 /// (src/README.md, section 10).
 #include "squeal/modes/modes.hpp"
-#include "squeal/settled/motion.hpp"
-#include "squeal/shooting/multipliers.hpp"
 
 #include <functional>
-#include <limits>
-#include <optional>
 
 namespace squeal
 {
 
-/// A mode at a point. Its track is the same number at every point along a line where it could be followed.
+/// A mode at a point. Its track is the same number at every point along a line where it could be followed. At design
+/// points it is that of the mode of the first point that it shares most with.
 struct SweptMode
 {
   std::complex<double> lambda; // [1/s]
@@ -34,26 +31,6 @@ struct SweptPlace
 /// Turns round the drive of the contacts, and the G that rotation brings.
 void reverse_rotation(Structure& structure, Interface& interface);
 
-/// What the chain of stages says at a point where a mode grows. outcome: of the search for a cycle, "settled" where the
-/// settled motion answers; else of the stage that ended the chain. NaN: not known.
-struct SweptMotion
-{
-  static constexpr double none = std::numeric_limits<double>::quiet_NaN();
-
-  Outcome outcome;
-  std::string heard;                                 // in a sentence
-  MotionKind kind = MotionKind::undecided;           // of what attracts
-  double frequency_hz = none;                        // of the cycle, or of the settled motion's strongest line
-  MeanValue energy{none, none};                      // [J] mean fluctuating one; error: of a settled motion's mean
-  Stability stability = Stability::not_examined;     // of the cycle that was found
-  double multiplier = none, multiplier_error = none; // modulus of its largest one
-  double estimate = none;                            // [m] estimated amplitude of the followed mode
-  double residual = none;                            // of the cycle, in the full space
-  std::vector<double> peak_to_peak;                  // [m] one a probe
-  int steps_per_period = 0;
-  long periods = 0; // integrated, of the full model
-};
-
 /// outcome: that of the stage that ended the point: "converged", or what failed and why.
 struct SweepPoint
 {
@@ -61,11 +38,9 @@ struct SweepPoint
   bool reversed = false;      // direction of rotation
   bool inserted = false;      // between points of the scene: modes were unclear, or pairs open or close
   Outcome outcome;
-  int closed = 0;                      // pairs
-  int unstable = 0;                    // modes in the band
-  std::vector<SweptMode> modes;        // in the band, falling growth rate
-  std::vector<SweptMode> beyond{};     // its end, by a little: they may come back
-  std::optional<SweptMotion> motion{}; // where it was sought
+  int closed = 0;               // pairs
+  int unstable = 0;             // modes in the band
+  std::vector<SweptMode> modes; // in the band, falling growth rate
 };
 
 /// Where the growth rate of a followed mode passes zero along the first number.
@@ -79,7 +54,7 @@ struct Threshold
   int change = 0;          // of the number of unstable modes as the value rises
 };
 
-/// outcome: "converged", "not converged" (points or motions failed: how many, the first reason), "refused", "skipped",
+/// outcome: "converged", "not converged" (points failed: how many, the first reason), "refused", "skipped",
 /// "off".
 /// residual: the largest backward error. iterations: number of points.
 struct Sweep
@@ -108,16 +83,15 @@ struct SweepProblem
 {
   const SweepSettings& settings;
   std::function<BrakeModel(std::span<const double> values, MPI_Comm comm)> model_at;
-  std::function<SweptMotion(const SweptPlace& place, MPI_Comm comm)> motion_at; // Error: why there is none
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;
   const SweepOptions& options;
+  const char* name = "sweep"; // in progress
 };
 
-/// Visits all points, follows the modes along each line and finds the thresholds on the way. Then come the motions of
-/// the scene's points where modes grow, if they are asked for. A point that fails is recorded with its reason. Groups
-/// of ranks visit a part of the points each. Collective.
+/// Visits all points, follows the modes along each line and finds the thresholds on the way. A point that fails is
+/// recorded with its reason. Groups of ranks visit a part of the points each. Collective.
 Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm);
 
 } // namespace squeal

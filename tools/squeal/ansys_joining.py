@@ -1,0 +1,83 @@
+"""What joins, turns and loads the parts of an Ansys deck: rotors, masses, contact pairs, ties and pilot nodes."""
+
+import numpy as np
+from squeal.deck_files import Problem, undefined
+from squeal.mesh_model import MOTIONS, corners_of
+
+BONDED = (3, 5, 6)  # values of the option 12 of contact elements
+
+
+def rotors_of(deck):
+    """Rotations of the parts that a component has elements of, or of the sides of contacts where it has those alone."""
+    model, of_side = deck.model, {}
+    for name, rate, place in deck.turning:
+        if name not in model.element_sets:
+            raise undefined(place, "CMROTATE: the component of elements", name, model.element_sets)
+        size = float(np.linalg.norm(rate))
+        turn = {"axis": [v / size for v in rate], "rate": size}
+        elements = set(model.element_sets[name])
+        parts = [part for part in model.parts.values() if not elements.isdisjoint(part.elements)]
+        sides = {deck.sides[n] for n in elements if n in deck.sides}
+        if not parts and not sides:
+            raise Problem(f"{place}: CMROTATE of {name}, which has no elements of the mesh; expected those of the rotor")
+        model.rotors += [(part, turn) for part in parts]
+        of_side.update(dict.fromkeys(() if parts else sides, turn))
+    return of_side
+
+
+def masses(deck):
+    """MASS21: mass and three moments of inertia, or by its option 3 the mass alone; one of several directions is that along x."""
+    joints = deck.model.joints
+    for place, node, real, kind in deck.masses:
+        if real not in deck.reals:
+            raise undefined(place, "MASS21: the real constant", real, deck.reals)
+        if node not in deck.model.nodes:
+            raise Problem(f"{place}: MASS21 on node {node}, which the deck does not define")
+        values = (deck.reals[real] + [0.0] * 6)[:6]
+        rotary = deck.options.get((kind, 3), 0) == 0
+        joints.mass[node] = joints.mass.get(node, 0.0) + values[0]
+        if rotary and len(set(values[:3])) > 1:
+            deck.note(f"the masses along y and z at node {node}, other than along x", place)
+        if rotary and any(values[3:]):
+            joints.inertia[node] = [*values[3:], 0.0, 0.0, 0.0]
+
+
+def couple(deck, pair, pilot, surface):
+    """A surface that follows a pilot node: as one rigid body, or in the mean where forces are distributed."""
+    joints, where = deck.model.joints, f"pilot node {pilot}"
+    if deck.options.get((pair["type"], 4), 0) == 1:
+        joints.mean.append((pilot, surface, 1.0, where))
+    else:
+        joints.rigid.append((pilot, surface, " ".join(MOTIONS), where))
+
+
+def pairs(deck, rotors):
+    """Contact and target elements of one real constant are a contact; its material has the friction. Sides that have no faces
+    of solids are gaps to be filled. rotors: turns by the sides of contacts."""
+    model, free = deck.model, None
+    for real, pair in deck.of_pair.items():
+        free = free or model.free_faces(model.solids())
+        names = []
+        for side in ("contact", "target"):
+            given = [face for face in pair.get(side, []) if side == "contact" or len(face) > 1]  # of one node is a pilot
+            faces = [free[corners_of(face)] for face in given if len(face) in (3, 4, 6, 8) and corners_of(face) in free]
+            dots = [face[0] for face in given if len(face) == 1]
+            if len(faces) + len(dots) < len(given):
+                model.notes.append(f"{len(given) - len(faces) - len(dots)} {side} elements of real constant {real}, which lie on no solid")
+            names.append(model.unused(f"{side}_{real}") if faces or dots else
+                         f"FILL IN [a surface]: real constant {real} of the deck has no {side} elements on faces of solids")
+            if faces:
+                model.surfaces[names[-1]] = faces
+            elif dots:
+                model.node_sets[names[-1]] = list(dict.fromkeys(dots))
+        pilot = [face[0] for face in pair.get("target", ()) if len(face) == 1 and face[0] in model.nodes]
+        if pilot and not names[0].startswith("FILL IN"):
+            couple(deck, pair, pilot[0], names[0])
+            continue
+        if deck.options.get((pair.get("type"), 12), 0) in BONDED and not any(name.startswith("FILL IN") for name in names):
+            model.ties.append(tuple(names))
+            continue
+        keys = {"friction": deck.constants.get(pair["material"], {}).get("MU", 0.0)}
+        for side, more in (("target", {}), ("contact", {"slave": "rotor"})):
+            keys |= {"rotation": rotors[real, side], **more} if (real, side) in rotors else {}
+        model.contacts.append((*names, keys))
