@@ -49,7 +49,7 @@ class Run:
         # The caller's arguments come last, so that its own --output wins.
         command += ["--output", str(folder), *self.length, *map(str, arguments)]
         with cores(ranks):
-            done = subprocess.run(command, capture_output=True, text=True, timeout=500, env={**os.environ, **NO_WAIT})
+            done = subprocess.run(command, capture_output=True, text=True, timeout=1000, env={**os.environ, **NO_WAIT})
         self.code, self.printed, self.errors = done.returncode, done.stdout, done.stderr
 
     @property
