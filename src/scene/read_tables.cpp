@@ -121,7 +121,9 @@ private:
     }
     catch (const Error& error)
     {
-      const auto text = node.value_exact<std::string>();
+      auto text = node.value_exact<std::string>();
+      for (std::size_t i = 0; node.is_array() && !text && i < node.as_array()->size(); ++i)
+        text = node.as_array()->get(i)->value_exact<std::string>();
       if (!text || !holds_numbers(key) || scene_.numbers.empty()) throw;
       std::vector<std::string> names;
       for (const auto& [name, value] : scene_.numbers) names.push_back(name);

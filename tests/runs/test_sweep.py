@@ -225,7 +225,8 @@ def names(rows):
     """The modes' numbers at each point, by rising frequency."""
     points = {}
     for row in sorted((row for row in rows if row["frequency_hz"]), key=lambda row: float(row["frequency_hz"])):
-        points.setdefault((row["friction.coefficient"], row["direction"]), []).append(row["track"])
+        value = row.get("friction.coefficient") or row["point.pad.mass"]
+        points.setdefault((value, row["direction"]), []).append(row["track"])
     return points
 
 
