@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <ranges>
 #include <utility>
 
@@ -74,9 +75,17 @@ VectorXd next_offset(const PathWalk& walk, int directions)
   return offset;
 }
 
-/// Takes the walk to a place by one increment of so much of the step. Returns whether there is a solution; else the
-/// walk is as it was.
-bool advance_to(const PathProblem& problem, const Place& place, double size, PathWalk& walk)
+/// The way that an increment ended: `far` with a row that moves further than it may.
+enum class Advance
+{
+  done,
+  far,
+  no_solution,
+};
+
+/// Takes the walk to a place by one increment of so much of the step, in which no row moves by more than `most` [m].
+/// The walk is as it was unless this is done.
+Advance advance_to(const PathProblem& problem, const Place& place, double size, double most, PathWalk& walk)
 {
   const StickSlipOperator& of = problem.of;
   const VectorXd offset = next_offset(walk, of.directions), q = load_at(problem, place) + of.N * offset;
@@ -90,13 +99,15 @@ bool advance_to(const PathProblem& problem, const Place& place, double size, Pat
   if (guess.r.lpNorm<Eigen::Infinity>() <= rounding * start.r.lpNorm<Eigen::Infinity>()) guess = start;
   StickSlipSolution found = solve_stick_slip(of, friction, q, guess);
   walk.iterations += found.iterations;
-  if (!found.converged) return false;
-  walk.rate = {(found.state.r - start.r) / size, (found.state.w - start.w) / size};
+  if (!found.converged) return Advance::no_solution;
   if (walk.increments > 0)
   {
     const VectorXd moved = (found.state.w - offset) - (walk.state.w - walk.offset);
-    walk.largest_move = std::max(walk.largest_move, moved.lpNorm<Eigen::Infinity>());
+    const double move = moved.lpNorm<Eigen::Infinity>();
+    if (move > most) return Advance::far;
+    walk.largest_move = std::max(walk.largest_move, move);
   }
+  walk.rate = {(found.state.r - start.r) / size, (found.state.w - start.w) / size};
   walk.state = std::move(found.state);
   walk.offset = offset;
   walk.q = q;
@@ -104,22 +115,42 @@ bool advance_to(const PathProblem& problem, const Place& place, double size, Pat
   walk.step = place.step;
   walk.part = place.part;
   ++walk.increments;
-  return true;
+  return Advance::done;
 }
 
-/// The whole path with each stretch in so many parts, which are halved where there is no solution. `first_rates`: from
-/// a walk before.
-PathWalk walk_in_parts(const PathProblem& problem, int parts, const std::vector<StickSlipState>& first_rates)
+/// A motion of the rows that counts as one beside this load [m].
+double least_move(const StickSlipOperator& of, const VectorXd& q)
 {
+  constexpr double rounding = 1e-9;
+  return rounding * of.motion(q);
+}
+
+/// The sentence of a walk that ends at a part of a step.
+std::string end_of(const PathProblem& problem, const PathWalk& walk, Advance last)
+{
+  const char* text = last == Advance::far
+                         ? "the state jumps at %.7g of step '%s', however short the increments: its equilibrium ends, "
+                           "and what follows is reached by a motion"
+                         : "there is no continuation beyond %.7g of step '%s'";
+  return format(text, walk.part, problem.ends[walk.step].name.c_str());
+}
+
+/// The whole path with each stretch in so many parts, which are halved where there is no solution, and where rows move
+/// as far as in the walk `before`: an increment that is shorter must move them less.
+PathWalk walk_in_parts(const PathProblem& problem, int parts, const PathWalk& before)
+{
+  const double most = before.completed ? std::max(0.75 * before.largest_move, least_move(problem.of, before.q))
+                                       : std::numeric_limits<double>::infinity();
   PathWalk walk = unloaded(problem);
   for (std::size_t step = 0; step < problem.ends.size(); ++step)
   {
-    walk.rate = step < first_rates.size() ? first_rates[step] : StickSlipState{};
+    walk.rate = step < before.first_rates.size() ? before.first_rates[step] : StickSlipState{};
     double at = 0, begin = 0, share = 1;
     for (double end = first_stretch; at < 1;)
     {
       const double part = share * (end - begin) / parts, next = end - at - part < least_part ? end : at + part;
-      if (advance_to(problem, {step, next}, next - at, walk))
+      const Advance last = advance_to(problem, {step, next}, next - at, most, walk);
+      if (last == Advance::done)
       {
         if (at == 0) walk.first_rates.push_back(walk.rate);
         at = next;
@@ -132,6 +163,7 @@ PathWalk walk_in_parts(const PathProblem& problem, int parts, const std::vector<
       if (part / 2 >= least_part) continue;
       walk.step = step;
       walk.part = at;
+      walk.reason = end_of(problem, walk, last);
       return walk;
     }
   }
@@ -172,7 +204,8 @@ PathWalk hold_at(const PathProblem& problem, const StickSlipState& from)
   walk.state.r = from.r;
   walk.state.w.setZero();
   walk.offset += from.w;
-  walk.completed = advance_to(problem, {problem.ends.size() - 1, 1}, 1, walk);
+  walk.completed = advance_to(problem, {problem.ends.size() - 1, 1}, 1, std::numeric_limits<double>::infinity(),
+                              walk) == Advance::done;
   if (!walk.completed) walk.reason = "there is no rest with the undriven pairs where they are";
   return walk;
 }
@@ -182,33 +215,20 @@ PathWalk walk_path(const PathProblem& problem)
   if (has_no_scale(problem))
   {
     PathWalk walk = unloaded(problem);
-    walk.completed = advance_to(problem, {0, 1}, 1, walk);
+    walk.completed = advance_to(problem, {0, 1}, 1, std::numeric_limits<double>::infinity(), walk) == Advance::done;
     if (walk.completed) return walk;
   }
   PathWalk walk = walk_in_parts(problem, 1, {});
-  for (int parts = 2; walk.completed; parts *= 2)
+  for (int parts = 2; walk.completed && parts <= most_parts; parts *= 2)
   {
-    PathWalk finer = walk_in_parts(problem, parts, walk.first_rates);
-    constexpr double rounding = 1e-9;
-    const double least = rounding * problem.of.motion(finer.q);
-    finer.change = change_between(problem.of, walk.state.r, finer.state.r, least / problem.of.compliance);
+    PathWalk finer = walk_in_parts(problem, parts, walk);
     finer.iterations += walk.iterations;
-    const bool shrinks = finer.largest_move <= std::max(0.75 * walk.largest_move, least),
-               jumps = finer.largest_move > std::max(0.9 * walk.largest_move, least);
+    if (finer.completed)
+      finer.change = change_between(problem.of, walk.state.r, finer.state.r,
+                                    least_move(problem.of, finer.q) / problem.of.compliance);
     walk = std::move(finer);
-    if (walk.change <= accurate && shrinks) break;
-    if (parts < most_parts) continue;
-    if (jumps && walk.completed)
-    {
-      walk.completed = false;
-      walk.reason = "the state jumps on the way, however short the increments: its equilibrium ends, and what follows "
-                    "is reached by a motion";
-    }
-    break;
+    if (walk.change <= accurate) break;
   }
-  if (!walk.completed && walk.reason.empty())
-    walk.reason =
-        format("there is no continuation beyond %.7g of step '%s'", walk.part, problem.ends[walk.step].name.c_str());
   return walk;
 }
 
