@@ -6,9 +6,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
+#include <sstream>
 
 namespace squeal
 {
@@ -18,41 +22,114 @@ namespace
 
 using Strings = std::vector<std::string>;
 
-/// An option of the whole run, PETSc's own.
+/// The value that an option of PETSc's takes.
+enum class Value
+{
+  flag,   // nothing, or true or false
+  file,   // nothing, or a file that can be written, with more behind a colon
+  viewer, // [ascii][:file[:format[:append]]]
+  text,
+};
+
 struct SessionOption
 {
   const char* name;
+  Value value;
   const char* meaning;
 };
 
-// PETSc obeys them while it starts, and says itself which value it does not take.
+// PETSc obeys them while it starts, and ends the process at the first value that it does not take.
 constexpr std::array session_options = {
-    SessionOption{"log_view", "[:FILE[:FORMAT]]  where the time went, one stage per step of the chain"},
-    SessionOption{"log_view_memory", "  adds memory to -log_view"},
-    SessionOption{"log_all", "  keeps every event"},
-    SessionOption{"log_trace", "[FILE]  writes every event as it happens"},
-    SessionOption{"log_exclude", "CLASSES  leaves events out"},
-    SessionOption{"info", "[FILE[:CLASSES]]  PETSc's own messages"},
-    SessionOption{"history", "[FILE]  keeps what PETSc prints"},
-    SessionOption{"options_left", "  lists options that were not used"},
-    SessionOption{"options_view", "  lists options"},
-    SessionOption{"malloc", "  PETSc's own allocator"},
-    SessionOption{"malloc_debug", "  checks memory"},
-    SessionOption{"malloc_dump", "  lists memory that was not freed"},
-    SessionOption{"malloc_view", "[FILE]  lists all memory"},
-    SessionOption{"memory_view", "  memory at the end"},
-    SessionOption{"no_signal_handler", "  leaves signals to the system"},
-    SessionOption{"get_total_flops", "  counts operations"},
-    SessionOption{"citations", "[FILE]  what to cite of PETSc"},
+    SessionOption{"log_view", Value::viewer, "[:FILE[:FORMAT]]  where the time went, one stage per step of the chain"},
+    SessionOption{"log_view_memory", Value::flag, "  adds memory to -log_view"},
+    SessionOption{"log_all", Value::flag, "  keeps every event"},
+    SessionOption{"log_trace", Value::file, "[FILE]  writes every event as it happens"},
+    SessionOption{"log_exclude", Value::text, "CLASSES  leaves events out"},
+    SessionOption{"info", Value::file, "[FILE[:CLASSES]]  PETSc's own messages"},
+    SessionOption{"history", Value::file, "[FILE]  keeps what PETSc prints"},
+    SessionOption{"options_left", Value::flag, "  lists options that were not used"},
+    SessionOption{"options_view", Value::flag, "  lists options"},
+    SessionOption{"malloc", Value::flag, "  PETSc's own allocator"},
+    SessionOption{"malloc_debug", Value::flag, "  checks memory"},
+    SessionOption{"malloc_dump", Value::flag, "  lists memory that was not freed"},
+    SessionOption{"malloc_view", Value::file, "[FILE]  lists all memory"},
+    SessionOption{"memory_view", Value::flag, "  memory at the end"},
+    SessionOption{"no_signal_handler", Value::flag, "  leaves signals to the system"},
+    SessionOption{"get_total_flops", Value::flag, "  counts operations"},
+    SessionOption{"citations", Value::file, "[FILE]  what to cite of PETSc"},
 };
+
+bool is_one_of(const std::string& word, std::initializer_list<const char*> words)
+{
+  return std::ranges::any_of(words, [&](const char* known) { return word == known; });
+}
+
+Strings parts_of(const std::string& value)
+{
+  Strings parts;
+  std::istringstream stream(value);
+  for (std::string part; std::getline(stream, part, ':');) parts.push_back(part);
+  return parts;
+}
+
+/// Tries whether the file can be written, so that a long run does not end without it. Leaves none behind.
+std::string problem_of_new_file(const std::string& name)
+{
+  if (name.empty()) return {};
+  std::error_code none;
+  const bool is_new = !std::filesystem::exists(name, none);
+  if (!std::ofstream(name, std::ios::app)) return shortened(name) + " cannot be written: " + std::strerror(errno);
+  if (is_new) std::filesystem::remove(name, none);
+  return {};
+}
+
+/// The file that PETSc writes by a value; empty: it writes none.
+std::string written_by(Value kind, const Strings& parts)
+{
+  if (kind == Value::viewer) return parts.size() > 1 ? parts[1] : "";
+  return kind == Value::file && !parts.empty() ? parts[0] : "";
+}
+
+std::string problem_of_viewer(const Strings& parts)
+{
+  if (!parts.empty() && !is_one_of(parts[0], {"", "ascii"}))
+    return "no viewer is called '" + shortened(parts[0]) + "'; write :FILE, :FILE:FORMAT or nothing";
+  const std::string formats = "ascii_info, ascii_info_detail, ascii_matlab, ascii_xml, ascii_csv, ascii_flamegraph";
+  if (parts.size() > 2 && !is_one_of(parts[2], {"", "default"}) &&
+      (", " + formats + ",").find(", " + parts[2] + ",") == std::string::npos)
+    return "no format is called '" + shortened(parts[2]) + "'; known: " + formats;
+  return {};
+}
+
+std::string problem_of_value(Value kind, const std::string& value)
+{
+  const Strings parts = parts_of(value);
+  if (parts.empty() || kind == Value::text) return {};
+  if (kind == Value::flag)
+    return is_one_of(value, {"true", "false", "yes", "no", "on", "off", "1", "0"}) ? "" : "it is true or false";
+  const std::string problem = kind == Value::viewer ? problem_of_viewer(parts) : "";
+  return problem.empty() ? problem_of_new_file(written_by(kind, parts)) : problem;
+}
+
+/// The kind of value of an option of the session, or of one by which a solver prints; nothing: another option.
+std::optional<Value> kind_of(const std::string& name)
+{
+  const auto of_session = std::ranges::find(session_options, name, &SessionOption::name);
+  if (of_session != session_options.end()) return of_session->value;
+  return is_printing_option(name) && solver_prefix_of(name) ? std::optional(Value::viewer) : std::nullopt;
+}
 
 /// Why PETSc must not see an option and its value; the name stands without its dash. Empty: it may.
 std::string problem_of_option(const std::string& name, const std::string& value)
 {
-  if (std::ranges::find(session_options, name, &SessionOption::name) != session_options.end()) return {};
-  if ((name == "modes_pep_type" && value == "jd") || (name == "cycle_snes_type" && value == "aspin"))
-    return "option -" + name + " " + value + ": it needs more than an operator";
-  return problem_of_option_name(name);
+  std::string problem;
+  if (const std::optional<Value> kind = kind_of(name))
+    problem = problem_of_value(*kind, value);
+  else if ((name == "modes_pep_type" && value == "jd") || (name == "cycle_snes_type" && value == "aspin"))
+    problem = "it needs more than an operator";
+  else
+    return problem_of_option_name(name);
+  return problem.empty() ? "" : "option -" + name + " " + shortened(value) + ": " + problem;
 }
 
 bool is_letter(const std::string& word, std::size_t place)
@@ -82,8 +159,9 @@ std::string hint_of_scene(const std::string& word)
                                                         : "; did you mean '" + under + "'?";
 }
 
-void examine(const Strings& words)
+void examine(GivenOptions& given)
 {
+  const Strings& words = given.words;
   for (std::size_t i = 0; i < words.size(); ++i)
   {
     if (!is_option(words[i]))
@@ -93,6 +171,8 @@ void examine(const Strings& words)
     const bool has_value = i + 1 < words.size() && !is_option(words[i + 1]);
     const std::string name = words[i].substr(1), value = has_value ? words[++i] : "";
     if (const std::string problem = problem_of_option(name, value); !problem.empty()) throw Error(problem);
+    const std::string file = written_by(kind_of(name).value_or(Value::text), parts_of(value));
+    if (!file.empty()) given.written.push_back(file);
   }
 }
 
@@ -129,7 +209,7 @@ GivenOptions given_options(int argc, char** argv)
       else
         for (std::string& word : words_of_file(++i < words.size() ? words[i] : ""))
           given.words.push_back(std::move(word));
-    examine(given.words);
+    examine(given);
   }
   catch (const Error& error)
   {

@@ -8,6 +8,7 @@
 #include "squeal/run.hpp"
 #include "squeal/tools.hpp"
 
+#include <algorithm>
 #include <cinttypes>
 #include <cstdio>
 #include <cstdlib>
@@ -29,11 +30,25 @@ std::filesystem::path default_output(const std::filesystem::path& scene)
          (scene.filename() == scene_file ? whole.parent_path().filename() : whole.stem());
 }
 
+/// Why a file that PETSc would write may not be written: it is the scene or a result. Empty: it may.
+std::string problem_of_written(const std::vector<std::string>& files, const Arguments& arguments)
+{
+  if (arguments.scene.empty()) return {};
+  std::vector<std::filesystem::path> taken = {arguments.scene};
+  const auto place = arguments.output.empty() ? default_output(arguments.scene) : arguments.output;
+  for (const char* name : words_of<ResultFile>) taken.push_back(place / name);
+  for (const std::string& file : files)
+    if (std::ranges::any_of(taken, [&](const auto& other) { return is_same_file(file, other); }))
+      return "the output " + shortened(file) + " of PETSc's would fall on the scene or a result: name another file";
+  return {};
+}
+
 /// The words that PETSc starts with; it looks for no others. Where something is wrong with them there are none.
 std::vector<std::string> options_for_petsc(Arguments& arguments, int argc, char** argv)
 {
   GivenOptions given = given_options(argc, argv);
   arguments.options_in_variable = given.from_variable;
+  if (given.problem.empty()) given.problem = problem_of_written(given.written, arguments);
   if (arguments.problem.empty()) arguments.problem = given.problem;
   if (!given.problem.empty()) given.words.clear();
   unsetenv("PETSC_OPTIONS");
@@ -43,17 +58,22 @@ std::vector<std::string> options_for_petsc(Arguments& arguments, int argc, char*
 
 void print_help()
 {
-  std::printf(
-      "squeal %s: friction-induced vibration of a finite-element structure\n\n"
-      "  mpirun -n 2 squeal SCENE [--set key=value]… [--output DIR] [--dry-run] [options]\n\n"
-      "  SCENE             a scene file (.toml), or a folder that holds a scene.toml\n"
-      "%s"
-      "  exit code: 0 all converged, 2 a stage did not (the report says which), 3 asked to end, 1 an error\n\n"
-      "  squeal run|plot|report|mesh|matrices|sound|uff|chart|convergence …: the tools; each explains itself "
-      "by --help\n\n"
-      "squeal --reference keys lists the keys of a scene file and all options, squeal --help contact those of one "
-      "table.\n",
-      SQUEAL_VERSION, argument_reference().c_str());
+  std::string prefixes;
+  for (const SolverPrefix& prefix : solver_prefixes) prefixes += std::string(" -") + prefix.text;
+  std::printf("squeal %s: friction-induced vibration of a finite-element structure\n\n"
+              "  mpirun -n 2 squeal SCENE [--set key=value]… [--output DIR] [--dry-run] [options]\n\n"
+              "  SCENE             a scene file (.toml), or a folder that holds a scene.toml\n"
+              "%s"
+              "  exit code: 0 all converged, 2 a stage did not (the report says which), 3 asked to end, 1 an error\n\n"
+              "  squeal run|plot|report|mesh|matrices|sound|uff|chart|convergence …: the tools; each explains itself "
+              "by --help\n\n"
+              "Keys of a scene file: squeal --reference keys, or of a table, squeal --help contact\n\n"
+              "Algorithm options (PETSc options database) [default]\n%s\n"
+              "Options of the solvers themselves, PETSc's, SLEPc's and MUMPS's, follow the prefixes\n %s\n"
+              "e.g. -cycle_snes_monitor, -modes_pep_monitor, -factor_mat_mumps_icntl_14 50.\n\n"
+              "Options of the whole run, PETSc's:\n%s",
+              SQUEAL_VERSION, argument_reference().c_str(), option_reference().c_str(), prefixes.c_str(),
+              session_option_reference().c_str());
 }
 
 /// The keys of a table, as the page of keys has them. Returns whether there is such a table.
@@ -175,7 +195,9 @@ int run_program(const Arguments& arguments)
   on_rank_zero(comm,
                [&]
                {
-                 request = request_text(scene, inputs_of(scene), options);
+                 const std::vector<std::filesystem::path> inputs = inputs_of(scene);
+                 check_outputs(scene, inputs, results.place());
+                 request = request_text(scene, inputs, options);
                  std::error_code ignored;
                  if (!arguments.restart) std::filesystem::remove_all(results.checkpoints(), ignored);
                });

@@ -27,7 +27,7 @@ std::string nearest_option(const std::string& option)
     if (as_option == option) return "it is a key of the scene: --set " + key + "=…";
   }
   const std::string nearest = nearest_word(option, known);
-  return nearest.empty() ? "squeal --reference keys lists the options" : "did you mean " + nearest + "?";
+  return nearest.empty() ? "squeal -help lists the options" : "did you mean " + nearest + "?";
 }
 
 } // namespace
@@ -100,6 +100,15 @@ std::string problem_of_option_name(const std::string& name)
   const OptionList own = options_of(unused);
   const bool known = std::ranges::find(own, option, &Option::name) != own.end() || solver_prefix_of(name);
   return known ? "" : "unknown option " + shortened(option) + "; " + nearest_option(option.substr(0, 60));
+}
+
+std::string option_reference()
+{
+  ProgramOptions standard;
+  std::string text;
+  for (const Option& option : options_of(standard))
+    text += format("  %-36s%s [%s]\n", option.name.c_str(), option.meaning.c_str(), value_of(option).c_str());
+  return text;
 }
 
 std::string option_page()

@@ -10,9 +10,10 @@ namespace squeal
 /// The words for PETSc.
 struct GivenOptions
 {
-  std::vector<std::string> words; // with those of a file in place of -options_file FILE
-  bool from_variable = false;     // whether PETSC_OPTIONS holds any
-  std::string problem;            // empty, or why PETSc must not see them
+  std::vector<std::string> words;     // with those of a file in place of -options_file FILE
+  bool from_variable = false;         // whether PETSC_OPTIONS holds any
+  std::vector<std::string> written{}; // files that PETSc will write
+  std::string problem;                // empty, or why PETSc must not see them
 };
 
 /// Words of the variable PETSC_OPTIONS come first, so that the command line prevails.

@@ -51,6 +51,9 @@ const SolverPrefix* solver_prefix_of(const std::string& name);
 /// Why the name of an option, which stands without its dash, is neither squeal's nor one of a prefix. Needs no PETSc.
 std::string problem_of_option_name(const std::string& name);
 
+/// A line for each option: name, meaning, default.
+std::string option_reference();
+
 /// A table of Markdown with a row for each option.
 std::string option_page();
 

@@ -194,6 +194,12 @@ void ResultsFolder::publish(Checkpoints checkpoints)
   published_ = true;
 }
 
+bool is_same_file(const fs::path& a, const fs::path& b)
+{
+  std::error_code none;
+  return fs::equivalent(a, b, none) || resolved(a) == resolved(b);
+}
+
 namespace
 {
 
@@ -228,6 +234,30 @@ std::vector<fs::path> inputs_of(const Scene& scene)
   if (scene.transient.start.kind == StartKind::file) inputs.push_back(scene.transient.start.file);
   if (scene.cycle.start.kind == CycleStartKind::file) inputs.push_back(scene.cycle.start.file);
   return inputs;
+}
+
+void check_outputs(const Scene& scene, const std::vector<fs::path>& inputs, const fs::path& place)
+{
+  const std::string elsewhere = "name another folder with --output DIR";
+  std::vector<fs::path> taken = inputs;
+  const auto take = [&](const fs::path& output, const std::string& remedy)
+  {
+    for (const fs::path& other : taken)
+      if (is_same_file(output, other))
+        throw Error("the output " + output.string() + " would fall on " + other.string() + ", an input or another " +
+                    "output: " + remedy);
+    taken.push_back(output);
+  };
+  for (const char* name : words_of<ResultFile>)
+  {
+    const fs::path result = place / name;
+    if (result.has_extension() && is_folder(result))
+      throw Error("the output " + result.string() + " is a folder, which the result would replace: " + elsewhere);
+    take(result, elsewhere);
+  }
+  for (const auto& [key, file] : {std::pair("[transient] save_state", scene.transient.save_state),
+                                  std::pair("[cycle] save_state", scene.cycle.save_state)})
+    if (!file.empty()) take(file, std::string("give ") + key + " another name");
 }
 
 } // namespace squeal

@@ -108,6 +108,11 @@ def tables(page):
         head = head and not set(line) <= set("|-")
 
 
+@pytest.fixture(scope="module")
+def helped(tmp_path_factory):
+    return Run(["-help"], 1, tmp_path_factory.mktemp("help")).printed
+
+
 @pytest.mark.parametrize("page", [KEYS, RESULTS])
 def test_pages_are_what_the_program_writes(page, tmp_path):
     """`squeal --reference keys > inputs/KEYS.md` renews the page, `--reference results` the other one."""
@@ -126,9 +131,11 @@ def test_every_key_has_a_meaning():
     assert len(rows) > 60 and all(cells[-1] for cells in rows)
 
 
-def test_every_option_is_explained():
-    known = [cells[0] for heading, cells in tables(KEYS) if heading == "Options"]
+def test_every_option_is_explained(helped):
+    known = dict(re.findall(r"^  (-\w+) .* \[(.*)\]$", helped, re.M))
+    page = {cells[0]: cells[1] for heading, cells in tables(KEYS) if heading == "Options"}
     assert 10 < len(known) <= 20
+    assert page == known
     guide = GUIDE.read_text()
     assert not [name for name in known if not re.search(rf"`[^`]*{name}\b", guide) and f" {name} " not in guide]
 

@@ -109,7 +109,8 @@ def test_dry_run_prints_the_model_and_writes_nothing(converged, scene):
     assert not run.output.exists()
 
 
-def test_help_explains_arguments(converged):
+def test_help_explains_arguments_and_options(converged):
     printed = converged("-help").printed
-    assert "--reference keys" in printed
+    for words in ("friction", "--reference keys", "-settled_periods", "-modes_", "-transient_contact_solver", "-cycle_finish"):
+        assert words in printed
     assert printed.count("--dry-run  ") == 1  # by one rank

@@ -114,6 +114,21 @@ def test_a_state_may_stand_inside_the_results(converged, tmp_path):
     assert str(output / "end.state") in (output / "resolved.toml").read_text()
 
 
+@pytest.mark.parametrize("output", ["resolved.toml", "report.json", "same.state"])
+def test_no_output_falls_on_an_input(squeal, tmp_path, output):
+    """The scene file has the name of a result, or one state would be written over another."""
+    scene = tmp_path / (output if output.endswith(".toml") else "scene.toml")
+    shutil.copy(SCENE, scene)
+    arguments = ["--output", tmp_path] if output == "resolved.toml" else []
+    if output == "report.json":
+        arguments = ["--set", f"transient.save_state={tmp_path}/report.json", "--output", tmp_path]
+    if output == "same.state":
+        arguments = ["--set", f"transient.save_state={tmp_path}/a.state", "--set", f"cycle.save_state={tmp_path}/a.state"]
+    run = squeal(scene, *arguments, ranks=1)
+    assert run.code == 1 and len(run.messages) == 1, run.errors
+    assert {file.name for file in tmp_path.iterdir()} == {scene.name}
+
+
 def make_device(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     return ["--set", f"transient.save_state={tmp_path}/pipe"]
@@ -143,6 +158,12 @@ def make_matrices_of_a_results_name(tmp_path):
     return []
 
 
+def make_scene_on_matrices_of_a_results_name(tmp_path):
+    make_matrices_of_a_results_name(tmp_path)
+    (tmp_path / "out" / "options.txt").write_text("of a run")
+    return ["--set", f"matrices.folder={tmp_path}/out/checkpoint"]
+
+
 def make_link_to_nothing(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "nothing")
     return ["--output", tmp_path / "link"]
@@ -151,7 +172,10 @@ def make_link_to_nothing(tmp_path):
 REFUSED = {"a pipe": (make_device, "pipe"), "a folder of a file's name": (make_folder_of_a_file, "history.h5 is a folder"),
            "a link": (make_link, "no run has made"), "a folder of another origin": (make_foreign_partial, "no run has made"),
            "a folder of a result's name": (make_matrices_of_a_results_name, "no run has made"),
-           "a link to nothing": (make_link_to_nothing, "File exists")}
+           "matrices in a result's place": (make_scene_on_matrices_of_a_results_name, "fall on"),
+           "a link to nothing": (make_link_to_nothing, "File exists"),
+           "a log on the scene": (lambda tmp_path: ["-log_view", f":{SCENE}"], "fall on the scene"),
+           "a log on a result": (lambda tmp_path: ["-history", tmp_path / "out" / "report.json"], "report.json")}
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -161,7 +185,8 @@ def test_nothing_of_the_users_is_replaced(squeal, tmp_path, name):
     (tmp_path / "out").mkdir()
     given = make(tmp_path)
     before = sorted(tmp_path.rglob("*")), files_below(tmp_path), SCENE.read_bytes()
-    run = squeal(SCENE, *([] if "--output" in given else ["--output", tmp_path / "out"]), *given, ranks=1)
+    scene = SCENE.with_name("matrices.toml") if any("matrices.folder" in str(word) for word in given) else SCENE
+    run = squeal(scene, *([] if "--output" in given else ["--output", tmp_path / "out"]), *given, ranks=1)
     assert run.code == 1 and len(run.messages) == 1 and words in run.messages[0], run.errors
     assert before == (sorted(tmp_path.rglob("*")), files_below(tmp_path), SCENE.read_bytes())
 

@@ -17,6 +17,7 @@ enum class ResultFile
   report,
   history,
   sweep,
+  sweep_motions,
   robustness,
   fields,
   field_places, // how ParaView finds its way in the fields
@@ -25,9 +26,9 @@ enum class ResultFile
   checkpoints, // a folder
 };
 
-template <> inline constexpr std::array words_of<ResultFile> = {"report.json",    "history.h5",  "sweep.csv",
-                                                                "robustness.csv", "fields.h5",   "fields.xdmf",
-                                                                "resolved.toml",  "options.txt", "checkpoint"};
+template <> inline constexpr std::array words_of<ResultFile> = {
+    "report.json", "history.h5",  "sweep.csv",     "sweep_motions.csv", "robustness.csv",
+    "fields.h5",   "fields.xdmf", "resolved.toml", "options.txt",       "checkpoint"};
 
 /// The fate of the checkpoints of a run that ends.
 enum class Checkpoints
@@ -80,5 +81,13 @@ private:
 /// The files and folders that the scene names as inputs, its own file first. Files that a geometry includes or merges
 /// are among them, but for names that a geometry computes. Of one rank; reads the geometry. Error: it may not be run.
 std::vector<std::filesystem::path> inputs_of(const Scene& scene);
+
+/// Whether two names are of one file, which may not exist yet.
+bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b);
+
+/// Error: an output of the scene, or a result in this place, would fall on what the run reads, on another output or on
+/// a folder.
+void check_outputs(const Scene& scene, const std::vector<std::filesystem::path>& inputs,
+                   const std::filesystem::path& place);
 
 } // namespace squeal
