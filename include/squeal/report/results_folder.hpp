@@ -17,7 +17,6 @@ enum class ResultFile
   report,
   history,
   sweep,
-  sweep_motions,
   robustness,
   fields,
   field_places, // how ParaView finds its way in the fields
@@ -26,9 +25,9 @@ enum class ResultFile
   checkpoints, // a folder
 };
 
-template <> inline constexpr std::array words_of<ResultFile> = {
-    "report.json", "history.h5",  "sweep.csv",     "sweep_motions.csv", "robustness.csv",
-    "fields.h5",   "fields.xdmf", "resolved.toml", "options.txt",       "checkpoint"};
+template <> inline constexpr std::array words_of<ResultFile> = {"report.json",    "history.h5",  "sweep.csv",
+                                                                "robustness.csv", "fields.h5",   "fields.xdmf",
+                                                                "resolved.toml",  "options.txt", "checkpoint"};
 
 /// The fate of the checkpoints of a run that ends.
 enum class Checkpoints
