@@ -65,6 +65,7 @@ long watched_periods(const Flow& flow, const ShootingOptions& options, const Con
   const Multipliers& multipliers = verdict.floquet.multipliers;
   if (options.watched_periods >= 0) return options.watched_periods;
   if (verdict.beside != Beside::not_seen || !is_left_open_by_largest(multipliers)) return 0;
+  if (!largest_reaches_across(multipliers)) return 0; // what leaves it open is the motion seen beside it
   const auto searched = static_cast<double>(log.convergence.periods);
   return static_cast<long>(std::min(enough, std::max(affordable_work / flow.work, searched)));
 }
