@@ -57,7 +57,8 @@ void hold_against_motion(const OrbitProblem& problem, const ShootingOptions& opt
 }
 
 /// The number of periods over which motions beside the orbit are watched: as many as are asked for. Else where only the
-/// bar of the largest multiplier leaves the verdict open, as many as are affordable or as the search took.
+/// bar of the largest multiplier of a whole matrix leaves the verdict open, as many as are affordable or as the search
+/// took.
 long watched_periods(const Flow& flow, const ShootingOptions& options, const ConvergenceLog& log,
                      const Verdict& verdict)
 {
@@ -65,7 +66,8 @@ long watched_periods(const Flow& flow, const ShootingOptions& options, const Con
   const Multipliers& multipliers = verdict.floquet.multipliers;
   if (options.watched_periods >= 0) return options.watched_periods;
   if (verdict.beside != Beside::not_seen || !is_left_open_by_largest(multipliers)) return 0;
-  if (!largest_reaches_across(multipliers)) return 0; // what leaves it open is the motion seen beside it
+  if (!largest_reaches_across(multipliers)) return 0;          // what leaves it open is the motion seen beside it
+  if (multipliers.method != MultiplierMethod::whole) return 0; // a projection's bar is the grid's, of a motion as well
   const auto searched = static_cast<double>(log.convergence.periods);
   return static_cast<long>(std::min(enough, std::max(affordable_work / flow.work, searched)));
 }
