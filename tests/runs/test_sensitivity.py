@@ -243,8 +243,8 @@ def test_numbers_are_called_by_name(tmp_path, converged):
                      "part.pin.density": "", "rigid_body.holder.mass": "", "spring.0.stiffness": "holder to ground",
                      "contact.0.rotation.rate": "pin_face on disc_face"}
     text = two_pads(tmp_path).read_text().replace('"top"', '"the top.1"')
-    (tmp_path / "scene.toml").write_text(text + "\n[sensitivity]\n[sweep]\nkey = [\"point.'the top.1'.mass\", 'force.0.vector.2']\n"
-                                         "from = [0.3, -950]\nto = [0.4, -900]\npoints = 2\n")
+    (tmp_path / "points.csv").write_text("point.'the top.1'.mass,force.0.vector.2\n0.3,-950\n0.4,-900\n")
+    (tmp_path / "scene.toml").write_text(text + "\n[sensitivity]\n[sweep]\ntable = 'points.csv'\n")
     run = converged(tmp_path / "scene.toml", ranks=1)
     numbers = {d["key"]: d for d in run.report["sensitivity"]["modes"][0]["derivatives"]}
     mass = numbers['point."the top.1".mass']
