@@ -163,7 +163,7 @@ for name, function in {found!r}:
     assert re.findall(r"^usage: squeal-(\w+)|^ended: (.*)", done.stdout, re.M) == [
         word for name, _ in found for word in ((name, ""), ("", "0"))], done.stderr
     wrong = outside(site, "import sys; sys.argv = ['squeal-report', 'nothing']; from squeal.entry import report; report()")
-    assert wrong.returncode == 1 and wrong.stderr.startswith("squeal-report: nothing has no report.json")
+    assert wrong.returncode == 1 and wrong.stderr.startswith("squeal-report: there is no folder nothing")
 
 
 def test_the_version_stands_in_one_place(site):
