@@ -211,16 +211,16 @@ std::string beside_rest(const Report& report)
                        { return motion.kind == ReachedKind::steady || motion.kind == ReachedKind::varying; });
 }
 
-/// Why friction cannot feed a motion; empty: it may.
+/// Why friction cannot feed a motion; empty: it may, or something else does, such as another code's friction in K.
 std::string without_friction(const Report& report)
 {
-  const Equilibrium& found = report.point.equilibrium;
-  const std::vector<double> forces = closed_reactions(found);
+  const std::vector<double> forces = closed_reactions(report.point.equilibrium);
+  if (!forces.empty() && std::ranges::none_of(forces, [](double force) { return force > 0; }))
+    return "nothing presses: the contact carries no force, and what its friction does is unknown";
+  if (report.point.modes.unstable_count > 0) return {};
   if (report.model.pairs == 0) return "no contact: nothing is there that friction could feed";
   if (forces.empty()) return "nothing touches: no contact pair is closed, and friction does nothing";
-  if (std::ranges::none_of(forces, [](double force) { return force > 0; }))
-    return "nothing presses: the contact carries no force, and what its friction does is unknown";
-  if (!report.model.slides && report.point.modes.unstable_count == 0)
+  if (!report.model.slides)
     return "nothing slides: no drive moves a contact along its surface; no mode grows in the band";
   return {};
 }

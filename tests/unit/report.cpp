@@ -274,6 +274,18 @@ TEST_CASE("the table never shows figures of a cycle that did not converge")
   CHECK(text.find("NOT CONVERGED: the residual stalled") != std::string::npos);
 }
 
+TEST_CASE("a mode that grows without contact is told, and not the lack of contact")
+{
+  const Model model = one_of_each();
+  Report report = full_report(model);
+  report.motion.cycle.outcome = report.motion.settled.outcome = {OutcomeKind::off, "", 0, 0};
+  report.model.pairs = 0;
+  std::ranges::fill(report.point.equilibrium.closed, 0);
+  CHECK(heard(report, scene_of_test()) == "the equilibrium is unstable at 100 Hz");
+  report.point.modes.unstable_count = 0;
+  CHECK(heard(report, scene_of_test()).starts_with("no contact"));
+}
+
 TEST_CASE(
     "the short table: an answer, a row a stage, what failed, the next command; a known motion settles the estimate")
 {
