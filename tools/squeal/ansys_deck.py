@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 from squeal import ansys_joining
+from squeal.ansys_joining import Side
 from squeal.common import counted
 from squeal.deck_files import Problem, lines_of, number, whole
 from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part
@@ -34,8 +35,8 @@ class Deck:
         self.model = Model(file)
         self.types, self.materials = {}, {}
         self.constants = {}  # of materials by number and label
-        self.of_pair = {}  # faces and kind by the number of a real constant: "target", "contact"
-        self.sides = {}  # (real constant, "target" or "contact") by the numbers of such elements
+        self.of_pair = {}  # faces and kind by the number of a real constant, with those of each Side
+        self.sides = {}  # (real constant, Side) by the numbers of such elements
         self.reals, self.masses = {}, []  # values by real constant; (place, node, real constant, type) of MASS21
         self.options = {}  # of element types, by type and number of the option
         self.turning = []  # (name of a component, vector of its rate, place)
@@ -188,10 +189,10 @@ def add_element(deck, place, label, attributes, nodes):
         model.add_element(place, label, shape, nodes[: 3 if shape == "tri3" else 4], "abaqus")
         deck.bodies.setdefault((material, section or 1), []).append(label)
     elif kind in TARGETS | CONTACTS:
-        side = "target" if kind in TARGETS else "contact"
+        side = Side.TARGET if kind in TARGETS else Side.CONTACT
         deck.of_pair.setdefault(real, {"material": material}).setdefault(side, []).append(face_of(nodes))
         deck.sides[label] = real, side
-        if side == "contact":
+        if side is Side.CONTACT:
             deck.of_pair[real] |= {"material": material, "type": kind_number}
     elif kind == 179:
         deck.bolts.setdefault(section, []).append((place, nodes))

@@ -1,8 +1,18 @@
-"""What joins, turns and loads the parts of an Ansys deck: rotors, masses, contact pairs, ties and pilot nodes."""
+"""Joints, drives and masses of an Ansys deck: rotors, masses, contact pairs, ties and pilot nodes."""
+
+from enum import StrEnum
 
 import numpy as np
 from squeal.deck_files import Problem, undefined
 from squeal.mesh_model import MOTIONS, corners_of
+
+
+class Side(StrEnum):
+    """The two sides of a contact, by the names of their elements."""
+
+    CONTACT = "contact"
+    TARGET = "target"
+
 
 BONDED = (3, 5, 6)  # values of the option 12 of contact elements
 
@@ -58,8 +68,8 @@ def pairs(deck, rotors):
     for real, pair in deck.of_pair.items():
         free = free or model.free_faces(model.solids())
         names = []
-        for side in ("contact", "target"):
-            given = [face for face in pair.get(side, []) if side == "contact" or len(face) > 1]  # of one node is a pilot
+        for side in Side:
+            given = [face for face in pair.get(side, []) if side is Side.CONTACT or len(face) > 1]  # of one node is a pilot
             faces = [free[corners_of(face)] for face in given if len(face) in (3, 4, 6, 8) and corners_of(face) in free]
             dots = [face[0] for face in given if len(face) == 1]
             if len(faces) + len(dots) < len(given):
@@ -70,7 +80,7 @@ def pairs(deck, rotors):
                 model.surfaces[names[-1]] = faces
             elif dots:
                 model.node_sets[names[-1]] = list(dict.fromkeys(dots))
-        pilot = [face[0] for face in pair.get("target", ()) if len(face) == 1 and face[0] in model.nodes]
+        pilot = [face[0] for face in pair.get(Side.TARGET, ()) if len(face) == 1 and face[0] in model.nodes]
         if pilot and not names[0].startswith("FILL IN"):
             couple(deck, pair, pilot[0], names[0])
             continue
@@ -78,6 +88,6 @@ def pairs(deck, rotors):
             model.ties.append(tuple(names))
             continue
         keys = {"friction": deck.constants.get(pair["material"], {}).get("MU", 0.0)}
-        for side, more in (("target", {}), ("contact", {"slave": "rotor"})):
+        for side, more in ((Side.TARGET, {}), (Side.CONTACT, {"slave": "rotor"})):
             keys |= {"rotation": rotors[real, side], **more} if (real, side) in rotors else {}
         model.contacts.append((*names, keys))
