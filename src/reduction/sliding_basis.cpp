@@ -222,17 +222,6 @@ Index extend(SlidingBasis& basis, MultiVector X)
   return gained;
 }
 
-void truncate(SlidingBasis& basis, Index shapes)
-{
-  const Index size = basis.sketched + shapes;
-  basis.T.entries.conservativeResize(Eigen::NoChange, size);
-  for (BasisImage* image : images_of(basis))
-  {
-    image->contact_rows.entries.conservativeResize(Eigen::NoChange, size);
-    image->products.conservativeResize(size, size);
-  }
-}
-
 std::vector<Index> local_pivots(const ClosedContact& contact)
 {
   PetscInt first = 0, last = 0;

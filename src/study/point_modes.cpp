@@ -345,12 +345,6 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   move_to(modes.pencil, shift_below_zero(modes.M_z, modes.K_z));
 }
 
-void truncate(ModesBasis& modes, Index shapes)
-{
-  truncate(modes.basis, shapes);
-  std::ranges::fill(modes.attached, 0);
-}
-
 MultiVector expanded(const ModesBasis& modes, const ClosedContact& contact, const std::vector<TwoSidedPair>& pairs,
                      Side side)
 {

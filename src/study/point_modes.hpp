@@ -44,9 +44,6 @@ ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>
 /// Goes over to fewer closed pairs: their modes join the basis, whose shapes keep their places.
 void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<char>& closed);
 
-/// Drops all shapes but the first ones, so many.
-void truncate(ModesBasis& modes, Eigen::Index shapes);
-
 /// What modes are sought on, and how exactly.
 struct PointProblem
 {

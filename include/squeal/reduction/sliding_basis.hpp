@@ -48,9 +48,6 @@ MultiVector combination_of_shapes(const SlidingBasis& basis, const Eigen::Matrix
 /// Appends what the shapes X add to the span. Returns the number of columns gained.
 Eigen::Index extend(SlidingBasis& basis, MultiVector X);
 
-/// Drops all shapes but the first ones, so many.
-void truncate(SlidingBasis& basis, Eigen::Index shapes);
-
 /// Takes over the matrices of a model where they have changed.
 void set_model(SlidingBasis& basis, const Structure& structure, const Interface& interface);
 
