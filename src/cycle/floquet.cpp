@@ -25,6 +25,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+// parts of a change on other steps that are taken for the error
+constexpr double of_order_2 = 4. / 3, of_order_1 = 2;
+
 /// What a pair did over recorded periods.
 struct PairHistory
 {
@@ -237,7 +240,7 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   return model;
 }
 
-/// What the grid of time changes the modulus of each value of the spectrum by: one moved by half a step, and one of
+/// Sets the errors of the spectrum's moduli by the grid of time: what one moved by half a step changes, and one of
 /// other steps.
 void set_grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, const OtherSteps& other, double period,
                      const std::function<std::vector<StepRecord>(int)>& contacts, SlowMotions& slow)
@@ -319,7 +322,6 @@ void add_slow_motions(const CycleProblem& problem, PeriodMap& map, const OtherSt
 
 OtherSteps steps_to_compare(const Structure& structure, int steps)
 {
-  constexpr double of_order_2 = 4. / 3, of_order_1 = 2;
   if (!is_dear(steps * work_of_step(structure))) return {2 * steps + 1, of_order_1};
   return steps <= enough_steps ? OtherSteps{2 * steps, of_order_2} : OtherSteps{};
 }
@@ -336,7 +338,7 @@ Verdict examine(const CycleProblem& problem, const CycleOptions& options, const 
   map.reactions = problem.sliding.equilibrium.reactions;
   Flow flow = flow_of(map);
   const OtherSteps other =
-      steps > judged ? OtherSteps{steps, 4. / 3} : steps_to_compare(problem.sliding.structure, steps);
+      steps > judged ? OtherSteps{steps, of_order_2} : steps_to_compare(problem.sliding.structure, steps);
   add_slow_motions(problem, map, other, flow);
   const Orbit& orbit = cycle.orbit;
   const Preconditioner none;

@@ -249,7 +249,7 @@ std::vector<Match> follow(const ModeForms& forms, double clear)
 namespace
 {
 
-/// Of two modes locked in at one frequency, of which one grows: that one, whichever it is of the two.
+/// The mode that grows, of two locked in at one frequency, whichever it is of the two.
 std::size_t unstable_partner(const std::vector<TwoSidedPair>& modes, std::size_t mode)
 {
   const Complex own = modes[mode].lambda;

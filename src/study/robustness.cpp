@@ -65,7 +65,7 @@ bool is_known(const SweepPoint& sample)
   return sample.outcome.kind == OutcomeKind::converged;
 }
 
-/// Of each of so many numbers with the largest growth rates over |lambda| of the samples.
+/// Rank correlations of each of so many numbers with the largest growth rate over |lambda| of a sample.
 std::vector<double> correlations_of(const std::vector<SweepPoint>& samples, std::size_t numbers)
 {
   std::vector<double> growth;

@@ -287,7 +287,7 @@ def test_masses_of_ansys(tmp_path, constants):
 
 
 def test_nodes_with_one_force_are_a_group(tmp_path):
-    """Of commands and of cards: the sum of their forces acts on all; so are nodes of a line each that are held alike."""
+    """Commands and cards alike: the sum of their forces acts on all; so are nodes of a line each that are held alike."""
     more = "".join(f"F,{n},FZ,-8.\n" for n in (13, 14, 15, 16)) + "F,9,FX,3.\n"
     scene, _ = converted(tmp_path, cdb(BRICK_ROWS, more), "deck.cdb")
     assert scene["force"] == [{"on": "node_9", "vector": [3, 0, 0]}, {"on": "loaded_1", "vector": [0, 0, -32]}]

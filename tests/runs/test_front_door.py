@@ -149,7 +149,7 @@ CAUGHT = {
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    """What the pin prints without a change."""
+    """The pin's table without a change."""
     return Run([PIN, *QUICK, "--dry-run"], 1, tmp_path_factory.mktemp("plain")).printed
 
 

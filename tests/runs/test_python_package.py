@@ -67,7 +67,7 @@ def test_named_numbers_stand_wherever_a_key_takes_one():
 
 
 def test_the_keys_that_take_texts_are_known():
-    """Of the page of keys: texts, words, paths, motions and directions, for which no number stands by name."""
+    """Keys of the page: texts, words, paths, motions and directions, for which no number stands by name."""
     from squeal.scene import ENDS, TEXTS
 
     rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \|[^|]*\| ?([^|]*?) ?\|", (INPUTS / "KEYS.md").read_text(), re.M)

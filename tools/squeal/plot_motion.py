@@ -159,7 +159,7 @@ def lift_off_of(run):
 
 
 def measure_of(run, area):
-    """What parts of a contact are counted by; area: the sum of areas_of."""
+    """The measure that parts of a contact are counted by; area: the sum of areas_of."""
     return "number of pairs" if area == run.report["model"]["pairs"] else f"area of {1e4 * area:.4g} cm²"
 
 

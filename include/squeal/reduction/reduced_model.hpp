@@ -80,7 +80,7 @@ inline constexpr PetscInt all_attachments = std::numeric_limits<PetscInt>::max()
 /// columns, 200 after 121 and 80 after 101. The brake of 239 246 needs 82 from 300 of 2997.
 inline constexpr PetscInt attachments_on_recorded_contact = 300;
 
-/// Of its modes, those that are kept apart: what they change says what those beyond them may.
+/// Part of its modes that is kept apart: what they change says what those beyond them may.
 inline constexpr double kept_apart = 0.25;
 
 /// How a model is reduced.

@@ -15,7 +15,7 @@ namespace squeal
 /// What each free degree of freedom is. Texts are made on demand only, since a model has many degrees of freedom.
 struct DofNames
 {
-  // Of a mesh:
+  // Names of a mesh:
   std::vector<std::string> bodies; // "part disc", "point tip", "rigid body carrier"
   std::vector<int> body;           // index in `bodies` of each node
   std::vector<Vec3> at;            // [m] position of each node

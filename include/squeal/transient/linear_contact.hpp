@@ -32,7 +32,7 @@ public:
 
   bool is_open() const { return leading_.empty(); } // all pairs
 
-  /// Of the leading block.
+  /// The factor of the leading block.
   LeadingFactor factor() const;
 
   /// P db of each column.
