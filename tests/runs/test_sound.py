@@ -179,14 +179,22 @@ def levels_of(folder):
     return float(numbers[0]), float(numbers[1]), bands, done.stdout
 
 
-def test_a_settled_periodic_motion_is_as_loud_as_the_cycle(tmp_path):
-    """The pin's cycle attracts. A search that is cut short goes on from beside it: levels are the cycle's to 0.3 dB, since slow
+PIN = {"modes.method": "full", "cycle.steps_per_period": 60}
+
+
+@pytest.fixture(scope="module")
+def cycle(tmp_path_factory):
+    """The pin's cycle, which attracts."""
+    return squeal.run(INPUTS / "pin_on_disc", PIN | {"transient.enabled": False}, options=["-cycle_multipliers", "0"],
+                      output=tmp_path_factory.mktemp("pin") / "cycle")
+
+
+def test_a_settled_periodic_motion_is_as_loud_as_the_cycle(tmp_path, cycle):
+    """A search that is cut short goes on from beside it: levels are the cycle's to 0.3 dB, since slow
     modes still decay."""
-    pin = {"modes.method": "full", "cycle.steps_per_period": 60}
-    cycle = squeal.run(INPUTS / "pin_on_disc", pin | {"transient.enabled": False}, options=["-cycle_multipliers", "0"], output=tmp_path / "cycle")
     near = {"transient.start": "estimate", "transient.periods": 100, "transient.steps_per_period": 60, "cycle.start": "transient",
             "fidelity": "full", "cycle.tolerance": 1e-10}
-    settled = squeal.run(INPUTS / "pin_on_disc", pin | near, output=tmp_path / "settled", options=[
+    settled = squeal.run(INPUTS / "pin_on_disc", PIN | near, output=tmp_path / "settled", options=[
         "-cycle_multipliers", "0", "-cycle_free_periods", "6", "-cycle_max_periods", "12", "-settled_periods", "64", "-settled_exponents", "1"])
     entry = settled.report["settled"]
     assert entry["outcome"] == "settled" and entry["shapes"] > 10 and entry["energy_beside_shapes"] < 1e-3
@@ -201,24 +209,21 @@ def test_a_settled_periodic_motion_is_as_loud_as_the_cycle(tmp_path):
     assert "Levels are means over" in text and "rigid plane" in text
 
 
-def test_a_run_sounds_at_the_harmonics_of_its_cycle(tmp_path):
-    run = squeal.run(INPUTS / "pin_on_disc", {"mesh.parameters.divisions": 2, "damping.beta": 6e-7, "cycle.steps_per_period": 40,
-                                              "mesh.parameters.pin_height": 0.035},
-                     options=["-cycle_multipliers", "0"], output=tmp_path / "run")
-    f0 = run.report["cycle"]["frequency_hz"]
-    done = subprocess.run([sys.executable, ROOT / "tools" / "sound", run.folder, "--at", "0.09", "0", "0.4", "--seconds", "1"],
+def test_a_run_sounds_at_the_harmonics_of_its_cycle(cycle):
+    f0 = cycle.report["cycle"]["frequency_hz"]
+    done = subprocess.run([sys.executable, ROOT / "tools" / "sound", cycle.folder, "--at", "0.09", "0", "0.4", "--seconds", "1"],
                           capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert f0 < sound_field.AUDIBLE
     levels = {float(f): float(db) for f, db in re.findall(r"^ +([\d.]+) Hz +([-\d.]+) dB$", done.stdout, re.M)}
     assert list(levels) == pytest.approx(f0 * np.arange(1, len(levels) + 1), abs=0.1)
     scale = float(re.search(r"Full scale of sound.wav is (\S+) Pa", done.stdout)[1])
-    found = scale * lines_of(run.folder / "sound.wav", f0 * np.arange(1, len(levels) + 1))
+    found = scale * lines_of(cycle.folder / "sound.wav", f0 * np.arange(1, len(levels) + 1))
     loudest = max(levels.values())
     for amplitude, db in zip(found, levels.values()):
         if db > loudest - 50:  # what 16 bits hold well
             assert 20 * np.log10(amplitude / np.sqrt(2) / 20e-6) == pytest.approx(db, abs=0.1)
-    assert "rigid plane" in (run.folder / "sound.txt").read_text() and (run.folder / "sound.png").exists()
+    assert "rigid plane" in (cycle.folder / "sound.txt").read_text() and (cycle.folder / "sound.png").exists()
 
 
 def test_what_is_inside_a_body():
