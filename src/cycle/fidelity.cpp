@@ -154,8 +154,9 @@ find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, Fid
   fidelity.accuracy = request.accuracy;
   if (request.model != CycleModel::full) fidelity.contact_tolerance = 1e-3 * request.accuracy;
   fidelity.verdict_steps = settings.steps_per_period;
-  const bool open = request.model == CycleModel::automatic && given.settings.steps_per_period == 0;
-  FittedCycle result = search(problem, open ? StepChoice::by_accuracy : StepChoice::given, fidelity);
+  fidelity.chooses_steps = request.model == CycleModel::automatic && given.settings.steps_per_period == 0;
+  FittedCycle result =
+      search(problem, fidelity.chooses_steps ? StepChoice::by_accuracy : StepChoice::given, fidelity);
   if (!result.answers) return result;
   result.fidelity.steps_per_period = result.cycle.steps_per_period;
   const State& start = result.cycle.measured.start;

@@ -183,13 +183,14 @@ std::string starts_text(const Report& report)
                 other->starts.size(), elsewhere.c_str());
 }
 
-/// The error that the step may leave, where that is more than was asked.
+/// What the steps may leave, where it is more than the accuracy.
 std::string missed_accuracy(const Fidelity& fidelity)
 {
-  const double error = std::max(fidelity.step_frequency_error, fidelity.step_energy_error);
-  if (!(error > fidelity.accuracy)) return {};
-  return format("; by its steps frequency and energy are known to %.2g %%, where %.2g %% was asked", 100 * error,
-                100 * fidelity.accuracy);
+  const double frequency = fidelity.step_frequency_error, energy = fidelity.step_energy_error;
+  if (!(std::max(frequency, energy) > fidelity.accuracy)) return {};
+  return format("; %d steps a period leave %.2g %% of error in the frequency and %.2g %% in the energy%s",
+                fidelity.steps_per_period, 100 * frequency, 100 * energy,
+                fidelity.chooses_steps ? format(", where %.2g %% was asked", 100 * fidelity.accuracy).c_str() : "");
 }
 
 std::string cycle_sentence(const Report& report, const Scene& scene)
