@@ -25,14 +25,23 @@ Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const
 {
   constexpr int enough = 256; // steps a period to recognise a cycle of more steps by
   CycleSettings settings = scene.cycle;
-  if (settings.steps_per_period == 0)
-    settings.steps_per_period = std::clamp(motion.cycle.steps_per_period, first_steps, enough);
+  const bool open = settings.steps_per_period == 0;
+  if (open) settings.steps_per_period = std::clamp(motion.cycle.steps_per_period, first_steps, enough);
   const std::vector<ComplexMode>& modes = point.modes.modes;
   const bool chosen = settings.starts == 0;
   settings.starts = starts_sought(point, scene).value_or(0);
   const auto attractors = [&](const UnstableModes& started)
   {
-    Attractors found = find_attractors({point.sliding(), modes, started, settings, options.step, chosen});
+    const ComplexMode& mode = started.modes.front();
+    const auto refused = [&](int steps)
+    {
+      const double h = 1 / (mode.frequency_hz() * steps);
+      return !friction_refusal(point.sliding(), &mode, settings.theta, h, options.step, 1).empty();
+    };
+    while (open && settings.steps_per_period < most_steps && refused(settings.steps_per_period))
+      settings.steps_per_period *= 2;
+    Attractors found = find_attractors(
+        {point.sliding(), modes, started, settings, options.step, chosen && point.modes.unstable_count > 0});
     if (chosen && found.outcome.kind == OutcomeKind::not_converged) found.outcome.kind = OutcomeKind::completed;
     if (chosen && found.outcome.kind == OutcomeKind::refused) found.outcome.kind = OutcomeKind::skipped;
     return found;

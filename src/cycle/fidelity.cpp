@@ -14,7 +14,6 @@ namespace squeal
 namespace
 {
 
-constexpr int most_steps = 4096; // tried, until the growth at these is not misleading
 constexpr int plain_steps = 100; // a period of a model that the scene names
 
 /// What sets the number of steps a period.
@@ -155,8 +154,7 @@ find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, Fid
   if (request.model != CycleModel::full) fidelity.contact_tolerance = 1e-3 * request.accuracy;
   fidelity.verdict_steps = settings.steps_per_period;
   fidelity.chooses_steps = request.model == CycleModel::automatic && given.settings.steps_per_period == 0;
-  FittedCycle result =
-      search(problem, fidelity.chooses_steps ? StepChoice::by_accuracy : StepChoice::given, fidelity);
+  FittedCycle result = search(problem, fidelity.chooses_steps ? StepChoice::by_accuracy : StepChoice::given, fidelity);
   if (!result.answers) return result;
   result.fidelity.steps_per_period = result.cycle.steps_per_period;
   const State& start = result.cycle.measured.start;

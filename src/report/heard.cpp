@@ -170,7 +170,7 @@ std::string starts_text(const Report& report)
     const bool same = is_cycle(motion, energy, frequency);
     if (motion.kind == ReachedKind::unsettled && !same) continue; // it may still come there
     all += motion.starts.size();
-    if (same && motion.kind != ReachedKind::varying)
+    if (same) // means agree; steps that do not fit the period may keep a motion on a slowly attracting cycle varying
       here += motion.starts.size();
     else if (!other)
       other = &motion;

@@ -20,6 +20,9 @@ namespace squeal
 inline constexpr int first_steps = 64;
 inline constexpr double plain_tolerance = 1e-5;
 
+/// Steps a period at most that are tried where fewer are refused.
+inline constexpr int most_steps = 4096;
+
 /// The model asked for, and how accurate its cycle shall be.
 struct FidelityRequest
 {
@@ -39,7 +42,7 @@ struct Fidelity
   double lost_compliance = 0;                  // mean part of the active pairs' own compliance that is theirs
   int active_pairs = 0, sliding_pairs = 0;     // sliding: eliminated; the rest stays open
   int steps_per_period = 0, verdict_steps = 0; // of the cycle; where its stability was judged
-  bool chooses_steps = false; // until the accuracy is met; else the scene gives them
+  bool chooses_steps = false;                  // until the accuracy is met; else the scene gives them
   double contact_tolerance = 0;
   long reduced_periods = 0, full_periods = 0;
   /// Of the model: what all further corrections would change. NaN: not known.
