@@ -26,6 +26,9 @@ OF_THE_CLOCK = {"run", "timings", "processor_seconds", "exit_code", "memory_byte
 OF_THE_WAY = {"attempts", "next"}  # a run that goes on begins with the orbit of its checkpoint; the next command has its folder
 
 
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # a test under nohup would hand on that it is ignored
+
+
 def start(output, *arguments, ranks=1, scene=OSCILLATOR, stdout=subprocess.PIPE):
     launcher = [os.environ.get("MPIEXEC", "mpirun"), "-n", ranks] if ranks > 1 else []
     command = [*launcher, os.environ["SQUEAL"], scene, "--output", output, *arguments]
