@@ -204,91 +204,183 @@ double stick_slip_residual(const StickSlipOperator& of, const StickSlipFriction&
   return worst;
 }
 
-StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
-    : StatusSystem(of, friction, at, {})
+struct StatusFactors
 {
+  std::vector<Matrix3d> laws;        // J of each pair
+  double spring = 0;                 // [N/m] across rows
+  std::vector<std::size_t> unknown;  // pairs of the system; the others stick and leave it
+  std::vector<Index> rows, stuck;    // of the former, and of the latter
+  bool regular = true;               // no row was mended
+  Eigen::PartialPivLU<MatrixXd> own; // of `rows`
+};
+
+namespace
+{
+
+/// Motions of a pair by its unknowns, [m/N].
+Matrix3d motion_law(const StickSlipOperator& of, std::size_t pair, const Matrix3d& J)
+{
+  const NaturalScale& rho = of.rho[pair];
+  return Vector3d(1 / rho.normal, 1 / rho.tangential, 1 / rho.tangential).asDiagonal() * (J - Matrix3d::Identity());
+}
+
+/// Columns of M R - N W in some rows, for reactions R y and motions W y of a pair.
+MatrixXd columns_by(const StickSlipOperator& of, std::size_t pair, const Matrix3d& R, const Matrix3d& W)
+{
+  const PairRows<Index> pair_rows(of.directions);
+  const Index own = pair_rows.per_pair(), first = pair_rows.normal(static_cast<Index>(pair));
+  MatrixXd columns = of.N.middleCols(first, own).lazyProduct(-W.topLeftCorner(own, own));
+  if (of.M.size() > 0)
+    columns.noalias() += of.M.middleCols(first, own).lazyProduct(R.topLeftCorner(own, own));
+  else
+    columns.middleRows(first, own) += R.topLeftCorner(own, own);
+  return columns;
+}
+
+/// The motions by the unknowns y of pairs, all of whose rows these are.
+MatrixXd motions_by(const StickSlipOperator& of, const std::vector<Matrix3d>& laws, const MatrixXd& y)
+{
+  const PairRows<Index> rows(of.directions);
+  const Index own = rows.per_pair();
+  MatrixXd w(y.rows(), y.cols());
+  for (std::size_t pair = 0; pair < laws.size(); ++pair)
+  {
+    const Index first = rows.normal(static_cast<Index>(pair));
+    w.middleRows(first, own) =
+        motion_law(of, pair, laws[pair]).topLeftCorner(own, own).lazyProduct(y.middleRows(first, own));
+  }
+  return w;
+}
+
+/// (M R - N W)^-1 times columns, by the laws of the factors.
+MatrixXd solved(const StickSlipOperator& of, const StatusFactors& by, const MatrixXd& columns)
+{
+  MatrixXd y = MatrixXd::Zero(columns.rows(), columns.cols());
+  if (!by.rows.empty()) y(by.rows, Eigen::all) = by.own.solve(MatrixXd(columns(by.rows, Eigen::all))).eval();
+  if (by.stuck.empty()) return y;
+  const MatrixXd forces = columns + of.N * motions_by(of, by.laws, y);
+  y(by.stuck, Eigen::all) = forces(by.stuck, Eigen::all);
+  return y;
+}
+
+} // namespace
+
+StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
+    : of_(of)
+{
+  read_laws(friction, at, 0);
+  factor(0);
 }
 
 StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at,
-                           const Softening& soft)
-    : of_(of), own_(PairRows<Index>(of.directions).per_pair())
+                           const Softening& soft, double near, std::shared_ptr<const StatusFactors>& factors)
+    : of_(of), factors_(factors)
 {
-  const PairRows<Index> rows(of.directions);
-  const bool whole = of.M.size() > 0;
-  const PairStates states{of, friction, at, soft.force};
+  read_laws(friction, at, soft.force);
+  if (!factors_ || factors_->spring != soft.spring || !differ_by_rank(near)) factor(soft.spring);
+  factors = factors_;
+}
+
+void StatusSystem::read_laws(const StickSlipFriction& friction, const StickSlipState& at, double smooth)
+{
+  const PairRows<Index> rows(of_.directions);
+  const Index own = rows.per_pair();
+  const PairStates states{of_, friction, at, smooth};
   particular_ = {-at.r, VectorXd::Zero(at.r.size())};
-  for (std::size_t pair = 0; pair < of.rho.size(); ++pair)
+  for (std::size_t pair = 0; pair < of_.rho.size(); ++pair)
   {
     const PairState state = states[pair];
     statuses_.push_back(state.status());
     const Index first = rows.normal(static_cast<Index>(pair));
     const Vector3d motion(1 / state.rho.normal, 1 / state.rho.tangential, 1 / state.rho.tangential); // of a unit force
     const Projected to = state.projected();
-    laws_.push_back({to.J, motion.asDiagonal() * (to.J - Matrix3d::Identity())});
-    particular_.r.segment(first, own_) += to.p.head(own_);
-    particular_.w.segment(first, own_) = motion.head(own_).cwiseProduct(particular_.r.segment(first, own_));
-    if (!whole && soft.force == 0 && statuses_.back() == ContactStatus::stick) continue;
-    unknown_.push_back(pair);
-    for (Index k = 0; k < own_; ++k) rows_.push_back(first + k);
+    laws_.push_back(to.J);
+    particular_.r.segment(first, own) += to.p.head(own);
+    particular_.w.segment(first, own) = motion.head(own).cwiseProduct(particular_.r.segment(first, own));
   }
-  factor(soft);
 }
 
-void StatusSystem::factor(const Softening& soft)
+bool StatusSystem::differ_by_rank(double near)
+{
+  constexpr Index most = 6; // one in so many rows: more cost about as much as factors
+  if (!factors_->regular) return false;
+  const PairRows<Index> rows(of_.directions);
+  const Index own = rows.per_pair();
+  std::vector<std::size_t> pairs;
+  for (std::size_t pair = 0; pair < laws_.size(); ++pair)
+    if ((laws_[pair] - factors_->laws[pair]).lpNorm<Eigen::Infinity>() > near) pairs.push_back(pair);
+  const Index count = own * static_cast<Index>(pairs.size());
+  if (most * count > of_.N.rows()) return false;
+  MatrixXd changes(of_.N.rows(), count);
+  std::vector<Matrix3d> laws = factors_->laws;
+  for (const std::size_t pair : pairs)
+  {
+    const Matrix3d R = laws_[pair] - laws[pair], W = motion_law(of_, pair, R + Matrix3d::Identity());
+    changes.middleCols(static_cast<Index>(changed_.size()), own) = columns_by(of_, pair, R - factors_->spring * W, W);
+    for (Index k = 0; k < own; ++k) changed_.push_back(rows.normal(static_cast<Index>(pair)) + k);
+    laws[pair] = laws_[pair];
+  }
+  laws_ = std::move(laws);
+  if (pairs.empty()) return true;
+  by_changes_ = solved(of_, *factors_, changes);
+  own_.compute(MatrixXd::Identity(count, count) + by_changes_(changed_, Eigen::all));
+  return true;
+}
+
+void StatusSystem::factor(double spring)
 {
   const PairRows<Index> rows(of_.directions);
-  const auto size = static_cast<Index>(rows_.size());
-  const bool whole = of_.M.size() > 0;
-  MatrixXd matrix(size, size), of_pair(size, own_);
-  for (std::size_t i = 0; i < unknown_.size(); ++i)
+  const Index own = rows.per_pair();
+  StatusFactors made{laws_, spring, {}, {}, {}, true, {}};
+  for (std::size_t pair = 0; pair < laws_.size(); ++pair)
   {
-    const auto& [R, W] = laws_[unknown_[i]];
-    const Index first = rows.normal(static_cast<Index>(unknown_[i])), to = rows.normal(static_cast<Index>(i));
-    auto columns = matrix.middleCols(to, own_);
-    const MatrixXd motion = -W.topLeftCorner(own_, own_), reaction = (R - soft.spring * W).topLeftCorner(own_, own_);
-    of_pair = of_.N.middleCols(first, own_)(rows_, Eigen::all);
-    columns.noalias() = of_pair.lazyProduct(motion);
-    if (whole)
-    {
-      of_pair = of_.M.middleCols(first, own_)(rows_, Eigen::all);
-      columns.noalias() += of_pair.lazyProduct(reaction);
-    }
-    else
-      columns.middleRows(to, own_) += reaction;
-    for (Index k = 0; k < own_; ++k) // a row in which neither side moves leaves its friction open: it stays
-      if (columns.col(k).isZero(0)) columns(to + k, k) = 1;
+    const bool leaves = of_.M.size() == 0 && laws_[pair].topLeftCorner(own, own).isIdentity(0);
+    if (!leaves) made.unknown.push_back(pair);
+    for (Index k = 0; k < own; ++k)
+      (leaves ? made.stuck : made.rows).push_back(rows.normal(static_cast<Index>(pair)) + k);
   }
-  if (size == 0) return;
-  factors_.compute(matrix);
-  if (pivot_ratio(factors_) > 1e-13) return;
-  // rows of pairs that depend on each other: a compliance in series with each shares what they carry
-  constexpr double series = 1e-10; // of the largest pivot
-  matrix.diagonal().array() += series * factors_.matrixLU().diagonal().cwiseAbs().maxCoeff();
-  factors_.compute(matrix);
+  const auto size = static_cast<Index>(made.rows.size());
+  MatrixXd matrix(size, size);
+  for (std::size_t i = 0; i < made.unknown.size(); ++i)
+  {
+    const std::size_t pair = made.unknown[i];
+    const Index to = rows.normal(static_cast<Index>(i));
+    const Matrix3d W = motion_law(of_, pair, laws_[pair]);
+    matrix.middleCols(to, own) = columns_by(of_, pair, laws_[pair] - spring * W, W)(made.rows, Eigen::all);
+    for (Index k = to; k < to + own; ++k) // a row in which neither side moves leaves its friction open: it stays
+      if (matrix.col(k).isZero(0))
+      {
+        matrix(k, k) = 1;
+        made.regular = false;
+      }
+  }
+  if (size > 0)
+  {
+    made.own.compute(matrix);
+    if (!(pivot_ratio(made.own) > 1e-13))
+    {
+      // rows of pairs that depend on each other: a compliance in series with each shares what they carry
+      constexpr double series = 1e-10; // of the largest pivot
+      matrix.diagonal().array() += series * made.own.matrixLU().diagonal().cwiseAbs().maxCoeff();
+      made.own.compute(matrix);
+      made.regular = false;
+    }
+  }
+  factors_ = std::make_shared<const StatusFactors>(std::move(made));
 }
 
 StickSlipState StatusSystem::response(const VectorXd& rhs) const
 {
-  StickSlipState result{VectorXd::Zero(of_.N.rows()), VectorXd::Zero(of_.N.rows())};
+  VectorXd y = solved(of_, *factors_, -rhs);
+  if (!changed_.empty()) y -= by_changes_ * own_.solve(y(changed_));
+  StickSlipState result{y, motions_by(of_, laws_, y)};
   const PairRows<Index> rows(of_.directions);
-  if (!unknown_.empty())
+  const Index own = rows.per_pair();
+  for (std::size_t pair = 0; pair < laws_.size(); ++pair)
   {
-    const VectorXd y = factors_.solve(-rhs(rows_));
-    for (std::size_t i = 0; i < unknown_.size(); ++i)
-    {
-      const auto& [R, W] = laws_[unknown_[i]];
-      const Index first = rows.normal(static_cast<Index>(unknown_[i]));
-      const auto of_pair = y.segment(rows.normal(static_cast<Index>(i)), own_);
-      result.r.segment(first, own_) = R.topLeftCorner(own_, own_) * of_pair;
-      result.w.segment(first, own_) = W.topLeftCorner(own_, own_) * of_pair;
-    }
+    const Index first = rows.normal(static_cast<Index>(pair));
+    result.r.segment(first, own) = laws_[pair].topLeftCorner(own, own) * y.segment(first, own);
   }
-  if (unknown_.size() == statuses_.size()) return result;
-  const VectorXd forces = of_.N * result.w - rhs;
-  for (std::size_t pair = 0; pair < statuses_.size(); ++pair)
-    if (statuses_[pair] == ContactStatus::stick)
-      result.r.segment(rows.normal(static_cast<Index>(pair)), own_) =
-          forces.segment(rows.normal(static_cast<Index>(pair)), own_);
   return result;
 }
 
@@ -303,14 +395,14 @@ StickSlipState StatusSystem::change(const VectorXd& rhs, const Softening& soft) 
 
 int StatusSystem::index() const
 {
-  if (unknown_.empty()) return 1;
-  const auto negative = (factors_.matrixLU().diagonal().array() < 0).count();
-  return factors_.permutationP().determinant() * (negative % 2 == 0 ? 1 : -1) > 0 ? 1 : -1;
+  const auto negative = (factors_->own.matrixLU().diagonal().array() < 0).count();
+  return factors_->rows.empty() || factors_->own.permutationP().determinant() * (negative % 2 == 0 ? 1 : -1) > 0 ? 1
+                                                                                                                 : -1;
 }
 
 double StatusSystem::reciprocal_condition() const
 {
-  return unknown_.empty() ? 1 : pivot_ratio(factors_);
+  return factors_->rows.empty() ? 1 : pivot_ratio(factors_->own);
 }
 
 namespace
@@ -327,6 +419,7 @@ struct Increment
   const StickSlipOperator& of;
   const StickSlipFriction& friction;
   const VectorXd& q;
+  std::shared_ptr<const StatusFactors>& factors;
   StickSlipSolution best{}; // so far
 
   /// The rest of N w = q + M r, with springs from another state on.
@@ -367,11 +460,15 @@ struct Increment
   void by_statuses(StickSlipState at)
   {
     constexpr int most = 12;
+    constexpr double slow = 0.1;  // fall of the merit by a step with near laws
+    constexpr double near = 0.05; // of J
     for (int iteration = 0; !ends_at(at, tight) && iteration < most; ++iteration, ++best.iterations)
     {
       const VectorXd now = rest(at, 0, at.w);
-      const StickSlipState change = StatusSystem(of, friction, at).change(now, {});
-      at = beyond(at, part_of(at, change, 0, now, 0x1p-8), change);
+      const StickSlipState change = StatusSystem(of, friction, at, {}, near, factors).change(now, {});
+      const double before = merit(at, 0, now), part = part_of(at, change, 0, now, 0x1p-8);
+      at = beyond(at, part, change);
+      if (merit(at, 0, (1 - part) * now) > slow * before) factors.reset();
     }
   }
 
@@ -399,7 +496,7 @@ void Increment::by_smoothing(StickSlipState at)
       from = at.w;
     }
     const VectorXd now = lacking();
-    const StickSlipState change = StatusSystem(of, friction, at, soft).change(now, soft);
+    const StickSlipState change = StatusSystem(of, friction, at, soft, 0, factors).change(now, soft);
     const double part = part_of(at, change, soft.force, now, least_part);
     if (part == least_part) return; // rounding
     at = beyond(at, part, change);
@@ -409,9 +506,9 @@ void Increment::by_smoothing(StickSlipState at)
 } // namespace
 
 StickSlipSolution solve_stick_slip(const StickSlipOperator& of, const StickSlipFriction& friction, const VectorXd& q,
-                                   const StickSlipState& guess)
+                                   const StickSlipState& guess, std::shared_ptr<const StatusFactors>& factors)
 {
-  Increment increment{of, friction, q, {guess, 0, std::numeric_limits<double>::infinity(), false}};
+  Increment increment{of, friction, q, factors, {guess, 0, std::numeric_limits<double>::infinity(), false}};
   increment.by_statuses(guess);
   if (increment.best.converged || of.motion(q) == 0) return increment.best;
   increment.by_smoothing(guess);

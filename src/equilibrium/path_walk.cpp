@@ -17,9 +17,9 @@ namespace
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double least_part = 0x1p-20; // of a step: where a limit is known to
-constexpr double accurate = 1e-3;      // change of reactions by twice the increments
-constexpr int most_parts = 16;         // of a stretch
+constexpr double least_part = 0x1p-20;          // of a step: where a limit is known to
+constexpr double accurate = 1e-3;               // change of reactions by twice the increments
+constexpr int first_parts = 8, most_parts = 16; // of a stretch: coarser ones lose their way, and systems to find it
 
 /// A step is walked in stretches, the first to this part of it; each ends at four times the last one's end.
 constexpr double first_stretch = 0x1p-6;
@@ -97,7 +97,7 @@ Advance advance_to(const PathProblem& problem, const Place& place, double size, 
   if (walk.rate.r.size() > 0) guess = {start.r + size * walk.rate.r, start.w + size * walk.rate.w};
   constexpr double rounding = 1e-9; // of reactions: where the rate leads to none, it tells no statuses
   if (guess.r.lpNorm<Eigen::Infinity>() <= rounding * start.r.lpNorm<Eigen::Infinity>()) guess = start;
-  StickSlipSolution found = solve_stick_slip(of, friction, q, guess);
+  StickSlipSolution found = solve_stick_slip(of, friction, q, guess, walk.factors);
   walk.iterations += found.iterations;
   if (!found.converged) return Advance::no_solution;
   if (walk.increments > 0)
@@ -142,6 +142,7 @@ PathWalk walk_in_parts(const PathProblem& problem, int parts, const PathWalk& be
   const double most = before.completed ? std::max(0.75 * before.largest_move, least_move(problem.of, before.q))
                                        : std::numeric_limits<double>::infinity();
   PathWalk walk = unloaded(problem);
+  walk.factors = before.factors;
   for (std::size_t step = 0; step < problem.ends.size(); ++step)
   {
     walk.rate = step < before.first_rates.size() ? before.first_rates[step] : StickSlipState{};
@@ -218,8 +219,8 @@ PathWalk walk_path(const PathProblem& problem)
     walk.completed = advance_to(problem, {0, 1}, 1, std::numeric_limits<double>::infinity(), walk) == Advance::done;
     if (walk.completed) return walk;
   }
-  PathWalk walk = walk_in_parts(problem, 1, {});
-  for (int parts = 2; walk.completed && parts <= most_parts; parts *= 2)
+  PathWalk walk = walk_in_parts(problem, first_parts, {});
+  for (int parts = 2 * first_parts; walk.completed && parts <= most_parts; parts *= 2)
   {
     PathWalk finer = walk_in_parts(problem, parts, walk);
     finer.iterations += walk.iterations;

@@ -108,7 +108,8 @@ TEST_CASE("Klarbring's node at one load: the slip branch has the index that no r
   const VectorXd q = problem.ends[0].q;
   const auto from = [&](const StickSlipState& guess)
   {
-    const StickSlipSolution found = solve_stick_slip(node.of, problem.friction, q, guess);
+    std::shared_ptr<const StatusFactors> factors;
+    const StickSlipSolution found = solve_stick_slip(node.of, problem.friction, q, guess, factors);
     CHECK(found.converged);
     return std::pair{found.state, StatusSystem(node.of, problem.friction, found.state).index()};
   };

@@ -11,6 +11,7 @@
 #include "squeal/contact/pair_law.hpp"
 
 #include <Eigen/LU>
+#include <memory>
 #include <optional>
 
 namespace squeal
@@ -69,14 +70,20 @@ struct Softening
   double force = 0, spring = 0;
 };
 
+/// The factored system of a state on the way. Those of states whose laws differ in few pairs are solved by it.
+struct StatusFactors;
+
 /// The system of the statuses that an increment ended with, factored: with forces p = proj(r - rho w) and their
 /// derivative J, dr = J y + p - r and rho dw = (J - 1) y + p - r fulfil the linearised laws for all y.
 class StatusSystem
 {
 public:
   StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at);
+
+  /// By factors of the same operator, which are made anew where the laws of many pairs differ from theirs by more than
+  /// `near`, a change of J. Pairs that differ by less keep the law of the factors.
   StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at,
-               const Softening& soft);
+               const Softening& soft, double near, std::shared_ptr<const StatusFactors>& factors);
 
   /// The change of the state within the statuses by which N w - M r grows by `rhs`, and the laws' residual goes.
   StickSlipState change(const Eigen::VectorXd& rhs, const Softening& soft) const;
@@ -89,21 +96,19 @@ public:
   double reciprocal_condition() const; // smallest over largest pivot
 
 private:
-  struct Law
-  {
-    Eigen::Matrix3d r, w; // [-, m/N] by y
-  };
-
-  void factor(const Softening& soft);
+  void read_laws(const StickSlipFriction& friction, const StickSlipState& at, double smooth);
+  bool differ_by_rank(double near); // whether factors serve
+  void factor(double spring);
 
   const StickSlipOperator& of_;
-  Eigen::Index own_; // rows of a pair
-  std::vector<Law> laws_;
+  std::vector<Eigen::Matrix3d> laws_; // J of each pair
   std::vector<ContactStatus> statuses_;
-  std::vector<std::size_t> unknown_; // pairs of the system
-  std::vector<Eigen::Index> rows_;   // theirs
-  Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
+  std::shared_ptr<const StatusFactors> factors_;
   StickSlipState particular_; // y = 0
+  // the inverse of the factored system, times what the laws of some pairs add to it, and those pairs' rows
+  std::vector<Eigen::Index> changed_{};
+  Eigen::MatrixXd by_changes_{};
+  Eigen::PartialPivLU<Eigen::MatrixXd> own_{}; // 1 + by_changes_ in these rows
 };
 
 /// The largest miss of a pair's law, over the largest reaction of its contact, or `least` [N].
@@ -119,8 +124,9 @@ struct StickSlipSolution
   bool converged = false;
 };
 
-/// Solves one increment from a guess.
+/// Solves one increment from a guess. `factors`: of the last one by this operator, or none; replaced by those it makes.
 StickSlipSolution solve_stick_slip(const StickSlipOperator& of, const StickSlipFriction& friction,
-                                   const Eigen::VectorXd& q, const StickSlipState& guess);
+                                   const Eigen::VectorXd& q, const StickSlipState& guess,
+                                   std::shared_ptr<const StatusFactors>& factors);
 
 } // namespace squeal
