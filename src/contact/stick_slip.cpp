@@ -459,11 +459,15 @@ struct Increment
   /// Newton's method on the statuses, which near a solution ends in a few iterations.
   void by_statuses(StickSlipState at)
   {
-    constexpr int most = 12;
+    constexpr int patience = 3;   // steps that do not halve the residual
     constexpr double slow = 0.1;  // fall of the merit by a step with near laws
     constexpr double near = 0.05; // of J
-    for (int iteration = 0; !ends_at(at, tight) && iteration < most; ++iteration, ++best.iterations)
+    double least = std::numeric_limits<double>::infinity();
+    for (int idle = 0; !ends_at(at, tight); ++best.iterations)
     {
+      idle = best.residual < 0.5 * least ? 0 : idle + 1;
+      if (idle == patience) return;
+      if (idle == 0) least = best.residual;
       const VectorXd now = rest(at, 0, at.w);
       const StickSlipState change = StatusSystem(of, friction, at, {}, near, factors).change(now, {});
       const double before = merit(at, 0, now), part = part_of(at, change, 0, now, 0x1p-8);

@@ -40,8 +40,8 @@ struct PathWalk
   double part = 0;              // [-] of it
   int increments = 0, iterations = 0;
   StickSlipState rate{}; // of the state, by the part of the step: slips from nothing; empty: not known
-  std::vector<StickSlipState> first_rates{}; // that of each step's first increment
-  std::shared_ptr<const StatusFactors> factors{};
+  std::vector<StickSlipState> first_rates{};      // that of each step's first increment
+  std::shared_ptr<const StatusFactors> factors{}; // of the last system
   double change = 0;       // [-] of reactions, over the largest of their contact, from half as many increments
   double largest_move = 0; // [m] of a row in one increment, the first of the path aside
 };
