@@ -26,6 +26,8 @@ struct StickSlipOperator
   double compliance = 0;         // [m/N] the largest diagonal entry of M
   std::vector<int> contact;      // number of each pair's: reactions are judged by the largest of their contact
 
+  Eigen::VectorXd times_M(const Eigen::VectorXd& r) const { return M.size() > 0 ? Eigen::VectorXd(M * r) : r; }
+
   /// The size of a right-hand side as a motion [m].
   double motion(const Eigen::VectorXd& q) const
   {

@@ -1,0 +1,261 @@
+#include "pair_states.hpp"
+
+#include <Eigen/Dense>
+
+namespace squeal
+{
+
+namespace
+{
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+} // namespace
+
+StickSlipOperator make_stick_slip_operator(MatrixXd N, MatrixXd M, int directions, std::vector<int> contact)
+{
+  StickSlipOperator result{std::move(N), std::move(M), directions, {}, 0, std::move(contact)};
+  result.compliance = result.M.diagonal().maxCoeff();
+  for (Index row = 0; row < result.M.rows(); ++row) // neither side moves along it: a spring there carries nothing
+    if (result.M.row(row).isZero(0)) result.M(row, row) = result.compliance;
+  const PairRows<Index> rows(directions);
+  for (Index pair = 0; pair < static_cast<Index>(result.contact.size()); ++pair)
+  {
+    PairBlock own{};
+    for (Index k = 0; k < rows.per_pair(); ++k)
+      own[static_cast<std::size_t>(k)][static_cast<std::size_t>(k)] =
+          result.M(rows.normal(pair) + k, rows.normal(pair) + k);
+    result.rho.push_back(natural_scale(own, result.compliance));
+  }
+  return result;
+}
+
+namespace
+{
+
+/// The smallest pivot over the largest.
+double pivot_ratio(const Eigen::PartialPivLU<MatrixXd>& factors)
+{
+  const VectorXd pivots = factors.matrixLU().diagonal().cwiseAbs();
+  return pivots.minCoeff() / pivots.maxCoeff();
+}
+
+} // namespace
+
+std::optional<DividedOperator> divided(StickSlipOperator& of)
+{
+  constexpr double dependent = 1e-8; // forces would lose as many digits
+  Eigen::PartialPivLU<MatrixXd> by(of.M);
+  // a pivot of zero has no estimate of the condition
+  if (!(pivot_ratio(by) > dependent && by.rcond() > dependent)) return std::nullopt;
+  of.N = by.solve(of.N).eval();
+  of.M.resize(0, 0);
+  return DividedOperator{std::move(of), std::move(by)};
+}
+
+struct StatusFactors
+{
+  std::vector<Matrix3d> laws;        // J of each pair
+  double spring = 0;                 // [N/m] across rows
+  std::vector<std::size_t> unknown;  // pairs of the system; the others stick and leave it
+  std::vector<Index> rows, stuck;    // of the former, and of the latter
+  bool regular = true;               // no row was mended
+  Eigen::PartialPivLU<MatrixXd> own; // of `rows`
+};
+
+namespace
+{
+
+/// Motions of a pair by its unknowns, [m/N].
+Matrix3d motion_law(const StickSlipOperator& of, std::size_t pair, const Matrix3d& J)
+{
+  const NaturalScale& rho = of.rho[pair];
+  return Vector3d(1 / rho.normal, 1 / rho.tangential, 1 / rho.tangential).asDiagonal() * (J - Matrix3d::Identity());
+}
+
+/// Columns of M R - N W in some rows, for reactions R y and motions W y of a pair.
+MatrixXd columns_by(const StickSlipOperator& of, std::size_t pair, const Matrix3d& R, const Matrix3d& W)
+{
+  const PairRows<Index> pair_rows(of.directions);
+  const Index own = pair_rows.per_pair(), first = pair_rows.normal(static_cast<Index>(pair));
+  MatrixXd columns = of.N.middleCols(first, own).lazyProduct(-W.topLeftCorner(own, own));
+  if (of.M.size() > 0)
+    columns.noalias() += of.M.middleCols(first, own).lazyProduct(R.topLeftCorner(own, own));
+  else
+    columns.middleRows(first, own) += R.topLeftCorner(own, own);
+  return columns;
+}
+
+/// The motions by the unknowns y of pairs, all of whose rows these are.
+MatrixXd motions_by(const StickSlipOperator& of, const std::vector<Matrix3d>& laws, const MatrixXd& y)
+{
+  const PairRows<Index> rows(of.directions);
+  const Index own = rows.per_pair();
+  MatrixXd w(y.rows(), y.cols());
+  for (std::size_t pair = 0; pair < laws.size(); ++pair)
+  {
+    const Index first = rows.normal(static_cast<Index>(pair));
+    w.middleRows(first, own) =
+        motion_law(of, pair, laws[pair]).topLeftCorner(own, own).lazyProduct(y.middleRows(first, own));
+  }
+  return w;
+}
+
+/// (M R - N W)^-1 times columns, by the laws of the factors.
+MatrixXd solved(const StickSlipOperator& of, const StatusFactors& by, const MatrixXd& columns)
+{
+  MatrixXd y = MatrixXd::Zero(columns.rows(), columns.cols());
+  if (!by.rows.empty()) y(by.rows, Eigen::all) = by.own.solve(MatrixXd(columns(by.rows, Eigen::all))).eval();
+  if (by.stuck.empty()) return y;
+  const MatrixXd forces = columns + of.N * motions_by(of, by.laws, y);
+  y(by.stuck, Eigen::all) = forces(by.stuck, Eigen::all);
+  return y;
+}
+
+} // namespace
+
+StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at)
+    : of_(of)
+{
+  read_laws(friction, at, 0);
+  factor(0);
+}
+
+StatusSystem::StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at,
+                           const Softening& soft, double near, std::shared_ptr<const StatusFactors>& factors)
+    : of_(of), factors_(factors)
+{
+  read_laws(friction, at, soft.force);
+  if (!factors_ || factors_->spring != soft.spring || !differ_by_rank(near)) factor(soft.spring);
+  factors = factors_;
+}
+
+void StatusSystem::read_laws(const StickSlipFriction& friction, const StickSlipState& at, double smooth)
+{
+  const PairRows<Index> rows(of_.directions);
+  const Index own = rows.per_pair();
+  const PairStates states{of_, friction, at, smooth};
+  particular_ = {-at.r, VectorXd::Zero(at.r.size())};
+  for (std::size_t pair = 0; pair < of_.rho.size(); ++pair)
+  {
+    const PairState state = states[pair];
+    statuses_.push_back(state.status());
+    const Index first = rows.normal(static_cast<Index>(pair));
+    const Vector3d motion(1 / state.rho.normal, 1 / state.rho.tangential, 1 / state.rho.tangential); // of a unit force
+    const ProjectedForces to = state.projected();
+    laws_.push_back(to.J);
+    particular_.r.segment(first, own) += to.p.head(own);
+    particular_.w.segment(first, own) = motion.head(own).cwiseProduct(particular_.r.segment(first, own));
+  }
+}
+
+bool StatusSystem::differ_by_rank(double near)
+{
+  constexpr Index most = 6; // one in so many rows: more cost about as much as factors
+  if (!factors_->regular) return false;
+  const PairRows<Index> rows(of_.directions);
+  const Index own = rows.per_pair();
+  std::vector<std::size_t> pairs;
+  for (std::size_t pair = 0; pair < laws_.size(); ++pair)
+    if ((laws_[pair] - factors_->laws[pair]).lpNorm<Eigen::Infinity>() > near) pairs.push_back(pair);
+  const Index count = own * static_cast<Index>(pairs.size());
+  if (most * count > of_.N.rows()) return false;
+  MatrixXd changes(of_.N.rows(), count);
+  std::vector<Matrix3d> laws = factors_->laws;
+  for (const std::size_t pair : pairs)
+  {
+    const Matrix3d R = laws_[pair] - laws[pair], W = motion_law(of_, pair, R + Matrix3d::Identity());
+    changes.middleCols(static_cast<Index>(changed_.size()), own) = columns_by(of_, pair, R - factors_->spring * W, W);
+    for (Index k = 0; k < own; ++k) changed_.push_back(rows.normal(static_cast<Index>(pair)) + k);
+    laws[pair] = laws_[pair];
+  }
+  laws_ = std::move(laws);
+  if (pairs.empty()) return true;
+  by_changes_ = solved(of_, *factors_, changes);
+  own_.compute(MatrixXd::Identity(count, count) + by_changes_(changed_, Eigen::all));
+  return true;
+}
+
+void StatusSystem::factor(double spring)
+{
+  const PairRows<Index> rows(of_.directions);
+  const Index own = rows.per_pair();
+  StatusFactors made{laws_, spring, {}, {}, {}, true, {}};
+  for (std::size_t pair = 0; pair < laws_.size(); ++pair)
+  {
+    const bool leaves = of_.M.size() == 0 && laws_[pair].topLeftCorner(own, own).isIdentity(0);
+    if (!leaves) made.unknown.push_back(pair);
+    for (Index k = 0; k < own; ++k)
+      (leaves ? made.stuck : made.rows).push_back(rows.normal(static_cast<Index>(pair)) + k);
+  }
+  const auto size = static_cast<Index>(made.rows.size());
+  MatrixXd matrix(size, size);
+  for (std::size_t i = 0; i < made.unknown.size(); ++i)
+  {
+    const std::size_t pair = made.unknown[i];
+    const Index to = rows.normal(static_cast<Index>(i));
+    const Matrix3d W = motion_law(of_, pair, laws_[pair]);
+    matrix.middleCols(to, own) = columns_by(of_, pair, laws_[pair] - spring * W, W)(made.rows, Eigen::all);
+    for (Index k = to; k < to + own; ++k) // a row in which neither side moves leaves its friction open: it stays
+      if (matrix.col(k).isZero(0))
+      {
+        matrix(k, k) = 1;
+        made.regular = false;
+      }
+  }
+  if (size > 0)
+  {
+    made.own.compute(matrix);
+    if (!(pivot_ratio(made.own) > 1e-13))
+    {
+      // rows of pairs that depend on each other: a compliance in series with each shares what they carry
+      constexpr double series = 1e-10; // of the largest pivot
+      matrix.diagonal().array() += series * made.own.matrixLU().diagonal().cwiseAbs().maxCoeff();
+      made.own.compute(matrix);
+      made.regular = false;
+    }
+  }
+  factors_ = std::make_shared<const StatusFactors>(std::move(made));
+}
+
+StickSlipState StatusSystem::response(const VectorXd& rhs) const
+{
+  VectorXd y = solved(of_, *factors_, -rhs);
+  if (!changed_.empty()) y -= by_changes_ * own_.solve(y(changed_));
+  StickSlipState result{y, motions_by(of_, laws_, y)};
+  const PairRows<Index> rows(of_.directions);
+  const Index own = rows.per_pair();
+  for (std::size_t pair = 0; pair < laws_.size(); ++pair)
+  {
+    const Index first = rows.normal(static_cast<Index>(pair));
+    result.r.segment(first, own) = laws_[pair].topLeftCorner(own, own) * y.segment(first, own);
+  }
+  return result;
+}
+
+StickSlipState StatusSystem::change(const VectorXd& rhs, const Softening& soft) const
+{
+  StickSlipState result =
+      response(rhs - of_.N * particular_.w + of_.times_M(particular_.r - soft.spring * particular_.w));
+  result.r += particular_.r;
+  result.w += particular_.w;
+  return result;
+}
+
+int StatusSystem::index() const
+{
+  const auto negative = (factors_->own.matrixLU().diagonal().array() < 0).count();
+  return factors_->rows.empty() || factors_->own.permutationP().determinant() * (negative % 2 == 0 ? 1 : -1) > 0 ? 1
+                                                                                                                 : -1;
+}
+
+double StatusSystem::reciprocal_condition() const
+{
+  return factors_->rows.empty() ? 1 : pivot_ratio(factors_->own);
+}
+
+} // namespace squeal
