@@ -17,9 +17,8 @@ namespace
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double least_part = 0x1p-20;          // of a step: where a limit is known to
-constexpr double accurate = 1e-3;               // change of reactions by twice the increments
-constexpr int first_parts = 8, most_parts = 16; // of a stretch: coarser ones lose their way, and systems to find it
+constexpr double least_part = 0x1p-20; // of a step: where a limit is known to
+constexpr int first_parts = 8;         // of a stretch: coarser ones lose the statuses
 
 /// A step is walked in stretches, the first to this part of it; each ends at four times the last one's end.
 constexpr double first_stretch = 0x1p-6;
@@ -220,17 +219,13 @@ PathWalk walk_path(const PathProblem& problem)
     if (walk.completed) return walk;
   }
   PathWalk walk = walk_in_parts(problem, first_parts, {});
-  for (int parts = 2 * first_parts; walk.completed && parts <= most_parts; parts *= 2)
-  {
-    PathWalk finer = walk_in_parts(problem, parts, walk);
-    finer.iterations += walk.iterations;
-    if (finer.completed)
-      finer.change = change_between(problem.of, walk.state.r, finer.state.r,
-                                    least_move(problem.of, finer.q) / problem.of.compliance);
-    walk = std::move(finer);
-    if (walk.change <= accurate) break;
-  }
-  return walk;
+  if (!walk.completed) return walk;
+  PathWalk finer = walk_in_parts(problem, 2 * first_parts, walk);
+  finer.iterations += walk.iterations;
+  if (finer.completed)
+    finer.change = change_between(problem.of, walk.state.r, finer.state.r,
+                                  least_move(problem.of, finer.q) / problem.of.compliance);
+  return finer;
 }
 
 } // namespace squeal

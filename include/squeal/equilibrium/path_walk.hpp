@@ -47,8 +47,8 @@ struct PathWalk
 };
 
 /// Walks along the path. An increment starts from the state that the last one's rate leads to. Increments grow from the
-/// start of a step on, where a new load turns slips, and are halved until reactions change by less than a thousandth. A
-/// load in proportion from closed gaps takes one: the problem has no scale.
+/// start of a step on, where a new load turns slips. A second walk with twice as many tells their error. A load in
+/// proportion from closed gaps takes one: the problem has no scale.
 PathWalk walk_path(const PathProblem& problem);
 
 /// The state under the whole load with its pairs stuck where they are: one increment from reactions r and slips w that
