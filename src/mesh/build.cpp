@@ -346,13 +346,19 @@ std::vector<int> drop_unused_nodes(Mesh& mesh)
   for (const Element& element : mesh.elements)
     for (const int node : nodes_of(element)) number[node] = 0;
   int kept = 0;
+  const std::size_t before = number.size() - mesh.parents.size(); // the last division
+  std::vector<NodeWeights> parents;
   for (std::size_t i = 0; i < number.size(); ++i)
     if (number[i] == 0)
     {
       mesh.nodes[kept] = mesh.nodes[i];
       number[i] = kept++;
+      if (i < before) continue;
+      for (auto& [node, weight] : mesh.parents[i - before]) node = number[node];
+      parents.push_back(std::move(mesh.parents[i - before]));
     }
   mesh.nodes.resize(kept);
+  mesh.parents = std::move(parents);
   for (Element& element : mesh.elements)
     for (int i = 0; i < node_count(element.shape); ++i) element.nodes[i] = number[element.nodes[i]];
   for (auto& [name, faces] : mesh.surfaces)
@@ -367,6 +373,7 @@ Mesh build_mesh(const FileMesh& file, const Scene& scene)
 {
   Mesh mesh;
   mesh.nodes = file.nodes;
+  mesh.parents = file.parents;
   if (std::none_of(file.blocks.begin(), file.blocks.end(),
                    [](const ElementBlock& block) { return block.dimension > 1; }))
     throw Error("the mesh has no elements: is the geometry empty?");

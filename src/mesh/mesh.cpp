@@ -38,9 +38,10 @@ void check_one_meaning(const Mesh& mesh, const std::string& name, const std::str
 
 Mesh read_file(const Scene& scene)
 {
-  const FileMesh file = read_mesh_file(*scene.mesh);
+  FileMesh file = read_mesh_file(*scene.mesh);
   try
   {
+    for (int i = 0; i < scene.mesh->refine; ++i) refine(file);
     return build_mesh(file, scene);
   }
   catch (const Error& error)

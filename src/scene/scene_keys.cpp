@@ -84,6 +84,7 @@ SceneKeys keys_of(MeshSource& m)
   return {
       {"file", &m.file, "path", "a .geo to mesh, or a mesh with named groups that gmsh reads", required, file},
       {"scale", &m.scale, "m", "length unit of the file", positive},
+      {"refine", &m.refine, "-", "number of times that each element is divided, a solid in 8", not_negative},
       {"parameters", &m.parameters, "table", "values for the DefineConstant of a .geo"},
   };
 }

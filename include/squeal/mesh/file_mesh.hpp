@@ -4,6 +4,7 @@
 #include "squeal/base/vec3.hpp"
 
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace squeal
@@ -20,11 +21,15 @@ struct ElementBlock
   std::vector<std::string> groups; // physical groups of the entity; a group without a name is named by its number
 };
 
+/// Nodes with their weights in a sum, ascending.
+using NodeWeights = std::vector<std::pair<int, double>>;
+
 /// Nodes and elements of a file.
 struct FileMesh
 {
   std::vector<Vec3> nodes; // in the unit of the file
   std::vector<ElementBlock> blocks;
+  std::vector<NodeWeights> parents{}; // of the last nodes, which the last division made of those before
 };
 
 /// The answer of the mesher: a mesh, or why there is none.

@@ -1,6 +1,7 @@
 #pragma once
 /// The mesh, its contact pairs and its partition. Rank 0 holds the whole mesh and prepares all that needs it; another
 /// rank receives a piece (squeal/solid/dofs.hpp). This room includes no PETSc.
+#include "squeal/mesh/file_mesh.hpp"
 #include "squeal/scene/scene.hpp"
 
 #include <map>
@@ -68,6 +69,7 @@ struct Mesh
   std::map<std::string, int> points;                       // node of every scene point, rigid body and coupling
   std::vector<std::vector<int>> beams;                     // nodes of each of the scene's, from end to end
   std::vector<std::vector<SuperelementRow>> superelements; // in the scene's order
+  std::vector<NodeWeights> parents; // of nodes that the last division made, the last of the file; on rank 0
 };
 
 /// Returns the scene's mesh with its points and reference points; without a mesh file it holds these points only.
