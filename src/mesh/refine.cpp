@@ -9,6 +9,7 @@
 /// All N are multiples of powers of two, hence exact. Caveat: a geometry's curvature beyond the element's own is not
 /// found again.
 #include "squeal/base/error.hpp"
+#include "squeal/base/free_memory.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 #include "squeal/mesh/shapes.hpp"
@@ -221,11 +222,16 @@ void divide(ElementBlock& block, const CellType& type, NewNodes& numbers, const 
 
 void refine(FileMesh& mesh)
 {
-  constexpr double most = 8;                   // nodes, and elements, for each one
-  std::size_t entries = 6 * mesh.nodes.size(); // degrees of freedom
+  constexpr double finer = 8;                        // nodes and elements for each one
+  constexpr double bytes_a_node = 3 * (3 * 81) * 12; // M, C and K of bricks, on all ranks together
+  std::size_t entries = 6 * mesh.nodes.size();       // degrees of freedom
   for (const ElementBlock& block : mesh.blocks) entries = std::max(entries, block.nodes.size());
-  if (most * static_cast<double>(entries) > std::numeric_limits<int>::max())
-    throw Error("mesh.refine divides the mesh into more elements than can be numbered: give a smaller one");
+  const double nodes = finer * static_cast<double>(mesh.nodes.size()), free = free_memory(MPI_COMM_SELF);
+  if (finer * static_cast<double>(entries) > std::numeric_limits<int>::max() || nodes * bytes_a_node > free)
+    throw Error(
+        format("mesh.refine would divide %zu nodes into about %.2g, whose matrices take %.2g GB where %.2g GB are "
+               "free: give a smaller one",
+               mesh.nodes.size(), nodes, 1e-9 * nodes * bytes_a_node, 1e-9 * free));
   mesh.parents.clear();
   NewNodes numbers(mesh);
   for (ElementBlock& block : mesh.blocks)
