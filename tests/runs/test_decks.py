@@ -180,6 +180,22 @@ def test_cards_of_bulk_data(tmp_path, card, table, expected):
         assert scene[table] == expected and left_out == []
 
 
+@pytest.mark.parametrize("section, axis", [("PRETENS,5,,21", [0, 0, -1]), ("PRETENS,5,,21,VECTOR,0.,0.,-2.", [0, 0, -2]),
+                                           ("PRETENS,5,,21,GRIDS,13,14,15", [0, 0, 1]), ("PRETENS,5,,21,CID,4", [0, 0, 1]),
+                                           ("PRETENS,5,9", None), ("BOLT,5,1,9", None)])
+def test_bolts_of_optistruct_and_simcenter(tmp_path, squeal, section, axis):
+    """Across a shank of two bricks, or along a bar: by the force that the case control selects, alone or in a sum."""
+    shank = GRIDS + ("GRID,17,,0.,0.,4.\nGRID,18,,1.,0.,4.\nGRID,19,,1.,1.,4.\nGRID,20,,0.,1.,4.\nCHEXA,3,2,13,14,15,16,17,18\n,19,20\n"
+                     "SURF,21,ELFACE\n,2,13,15\nPBAR,3,1,4.-2,1.-4,2.-4,3.-4\nCBAR,9,3,100,101,1.,0.,0.\nRBE2,7,100,123456,17,18,19,20\n"
+                     "SPC1,1,123456,101\nSPC1,1,123,9,10,11,12\nCORD2R,4,,0.,0.,0.,1.,0.,0.\n,0.,0.,1.\n")
+    force = "BOLTFOR,70,500.,5" if section.startswith("BOLT") else "PTFORC1,70,500.,5\nPTADD,72,70\nPTFORCE,71,5,900."
+    case = "SUBCASE 1\n  BOLTLD = 70\n" if section.startswith("BOLT") else "SUBCASE 1\n  PRETENSION = 72\n"
+    scene, left_out = converted(tmp_path, f"{case}BEGIN BULK\n{shank}{section}\n{force}\n", "deck.fem")
+    assert scene["bolt"] == [{"name": "bolt_5", **({"section": "surf_21", "axis": axis} if axis else {"beam": "bar_9"}), "tension": 500}]
+    assert left_out == ([] if section.startswith("BOLT") else ["forces of bolts 71, which the case control does not select"])
+    assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
+
+
 def test_nodes_and_weights_of_mean_couplings(tmp_path):
     """RBE3 of two weights: the nodes of each are a group."""
     scene, left_out = converted(tmp_path, GRIDS + "RBE3,7,,100,123,1.,123,13,14\n,2.,123,15,16\n", "deck.bdf")

@@ -12,7 +12,7 @@ from squeal import abaqus_steps
 from squeal.abaqus_nodes import abaqus_nodes, made_explicit
 from squeal.abaqus_parts import flattened
 from squeal.abaqus_properties import frame_of, read_materials, read_sections
-from squeal.deck_files import Problem, blocks_of, number, undefined, whole
+from squeal.deck_files import Problem, blocks_of, number, span, undefined, whole
 from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model
 
 SOLIDS = {"4": "tet4", "6": "wedge6", "8": "hex8", "10": "tet10", "20": "hex20"}
@@ -239,9 +239,7 @@ def read_set(block, key, sets, element_sets=None, model=None):
             if len(fields) not in (2, 3):
                 raise Problem(f"{place}: {len(fields)} fields; expected first, last[, step]")
             first, last, step = [*(whole(field or "1", place) for field in fields), 1][:3]
-            if step < 1 or last < first:
-                raise Problem(f"{place}: {first} to {last} by steps of {step}; expected ascending numbers")
-            found += range(first, last + 1, step)
+            found += span(first, last, step, place)
         else:
             for field in fields:
                 found += [int(field)] if field.isdecimal() else sets.get(field, place, "the set")

@@ -3,6 +3,7 @@
 import math
 
 from squeal.deck_files import Problem, number, whole
+from squeal.deck_joints import rectangle, tube
 from squeal.mesh_model import MOTIONS
 
 BEAMS = ("B31", "B31H", "B33", "B33H", "B31OS")
@@ -232,6 +233,8 @@ def beam_section(block, deck):
         keys["bending"].reverse()  # n1 is the width, which bending along it has as its height
         keys["axis_2"] = axis
     for n, _, nodes in list(lines_of_set(block, deck, BEAMS)):
+        if len(nodes) < 2:
+            raise Problem(f"{block.place}: the beam {n} has one node; expected two")
         name = f"{block.options['ELSET']}_{n}"
         deck.beams[n] = name
         deck.model.joints.beams.append((name, nodes[0], nodes[1], {**keys, "elements": 1}, deck.line_of(block.place)))
@@ -242,14 +245,9 @@ def section_of(kind, sizes):
     if kind == "CIRC" and sizes[:1] and sizes[0] > 0:
         return {"diameter": 2 * sizes[0]}
     if kind == "PIPE" and len(sizes) > 1 and 0 < sizes[1] < sizes[0]:
-        outer, inner = sizes[0], sizes[0] - sizes[1]
-        bending = math.pi / 4 * (outer**4 - inner**4)
-        return {"area": math.pi * (outer**2 - inner**2), "bending": [bending], "torsion": 2 * bending, "shear_factor": 0.5}
+        return tube(sizes[0], sizes[0] - sizes[1])
     if kind == "RECT" and len(sizes) > 1 and min(sizes[:2]) > 0:
-        a, b = sizes[:2]
-        long, short = max(a, b), min(a, b)
-        torsion = long * short**3 * (1 / 3 - 0.21 * short / long * (1 - short**4 / (12 * long**4)))
-        return {"area": a * b, "bending": [a * b**3 / 12, b * a**3 / 12], "torsion": torsion, "shear_factor": 5 / 6}
+        return rectangle(*sizes[:2])
     return None
 
 

@@ -2,7 +2,7 @@
 *NCOPY, *ELGEN, *ELCOPY, and *NODE in cylindrical or spherical coordinates."""
 
 import numpy as np
-from squeal.deck_files import Block, Problem, node_table, number, whole
+from squeal.deck_files import Block, Problem, node_table, number, span, whole
 
 REFUSED = {"NMAP": "maps nodes", "SYMMETRIC MODEL GENERATION": "makes nodes", "SUBSTRUCTURE GENERATE": "makes elements"}
 
@@ -50,7 +50,7 @@ def members(block, sets):
     for place, fields in block.rows():
         if "GENERATE" in block.options and len(fields) in (2, 3):
             first, last, step = [*(whole(field or "1", place) for field in fields), 1][:3]
-            found += range(first, last + 1, max(step, 1))
+            found += span(first, last, step, place)
         elif "GENERATE" not in block.options:
             for field in fields:
                 found += [int(field)] if field.isdecimal() else sets.get(field.upper(), [])
@@ -152,7 +152,7 @@ def generated(block, made):
         if last <= first or step < 1 or (last - first) % step:
             raise Problem(f"{place}: nodes {first} to {last} by steps of {step}: expected ascending numbers that a "
                           "whole number of steps reaches")
-        numbers = list(range(first, last + 1, step))
+        numbers = list(span(first, last, step, place))
         nodes.update((n, start + i / (len(numbers) - 1) * (end - start) if not kind else
                       on_arc(fields, place, made, start, end, i / (len(numbers) - 1))) for i, n in enumerate(numbers))
         nodes[first], nodes[last] = start, end

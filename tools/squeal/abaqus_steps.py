@@ -277,18 +277,9 @@ def add_bolt(deck, node, block, axis):
     if options.get("ELEMENT", "").isdecimal() and int(options["ELEMENT"]) in deck.beams:
         model.joints.bolts.append((deck.beams[int(options["ELEMENT"])], keys))
     elif surface in model.surfaces:
-        model.bolts.append((surface, {**keys, "axis": axis or normal_of(model, surface)}))
+        model.bolts.append((surface, {**keys, "axis": axis or model.normal_of(surface)}))
     else:
         deck.note("*PRE-TENSION SECTION of no surface and no beam that is there", block.place)
-
-
-def normal_of(model, surface):
-    """The mean normal of a surface's faces."""
-    total = np.zeros(3)
-    for face in model.surfaces[surface]:
-        a, b, c = (np.asarray(model.nodes[n]) for n in face[:3])
-        total += np.cross(b - a, c - a)
-    return (total / (np.linalg.norm(total) or 1)).tolist()
 
 
 def add_contacts(deck, ends):

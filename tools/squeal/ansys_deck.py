@@ -8,7 +8,7 @@ import numpy as np
 from squeal import ansys_joining
 from squeal.ansys_joining import Side
 from squeal.common import counted
-from squeal.deck_files import Problem, lines_of, number, whole
+from squeal.deck_files import Problem, lines_of, number, span, whole
 from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part
 
 # squeal's kinds by element type and by the number of different nodes
@@ -226,7 +226,7 @@ def read_component(words, lines, deck):
         elif not items or -n < items[-1]:
             raise Problem(f"{place}: {name} has the range to {-n} without a smaller beginning")
         else:
-            items += range(items[-1] + 1, -n + 1)
+            items += span(items[-1], -n, 1, place)[1:]
     if kind.startswith("NODE"):
         deck.model.node_sets[name] = items
     else:

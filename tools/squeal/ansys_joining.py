@@ -1,8 +1,8 @@
 """Joints, drives and masses of an Ansys deck: rotors, masses, contact pairs, ties and pilot nodes."""
 
+import math
 from enum import StrEnum
 
-import numpy as np
 from squeal.deck_files import Problem, undefined
 from squeal.mesh_model import MOTIONS, corners_of
 
@@ -23,7 +23,7 @@ def rotors_of(deck):
     for name, rate, place in deck.turning:
         if name not in model.element_sets:
             raise undefined(place, "CMROTATE: the component of elements", name, model.element_sets)
-        size = float(np.linalg.norm(rate))
+        size = math.hypot(*rate)
         turn = {"axis": [v / size for v in rate], "rate": size}
         elements = set(model.element_sets[name])
         parts = [part for part in model.parts.values() if not elements.isdisjoint(part.elements)]

@@ -151,6 +151,16 @@ def whole(text, place, what="a whole number"):
         raise Problem(f"{place}: '{text}': expected {what}") from None
 
 
+MOST_NUMBERS = 10_000_000  # of one range
+
+
+def span(first, last, step, place, to="to"):
+    """The numbers of a range that a deck gives by its ends."""
+    if step < 1 or last < first or (last - first) // step >= MOST_NUMBERS:
+        raise Problem(f"{place}: {first} {to} {last} by steps of {step}: expected ascending numbers, {MOST_NUMBERS} at most")
+    return range(first, last + 1, step)
+
+
 def number(text, place, what="a number"):
     """Fortran's forms too: 1.5D+3, and Nastran's 1.5+3."""
     try:

@@ -1,7 +1,24 @@
 """What decks say by nodes of their own: rigid and mean couplings, springs, bushings, beams, masses and loads at reference
 nodes, made into the tables of a scene. A reference node becomes a rigid body, a coupling or a point."""
 
+import numpy as np
+
 MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
+
+
+def tube(outer, inner):
+    """Keys of a [[beam]] between two radii."""
+    outer, inner = np.float64(outer), np.float64(inner)  # which overflow to what squeal refuses
+    bending = np.pi / 4 * (outer**4 - inner**4)
+    return {"area": np.pi * (outer**2 - inner**2), "bending": [bending], "torsion": 2 * bending, "shear_factor": 0.5}
+
+
+def rectangle(width, height):
+    """Keys of a [[beam]]; the torsion constant is Roark's approximation."""
+    width, height = np.float64(width), np.float64(height)
+    long, short = max(width, height), min(width, height)
+    torsion = long * short**3 * (1 / 3 - 0.21 * short / long * (1 - short**4 / (12 * long**4)))
+    return {"area": width * height, "bending": [width * height**3 / 12, height * width**3 / 12], "torsion": torsion, "shear_factor": 5 / 6}
 
 
 class Joints:

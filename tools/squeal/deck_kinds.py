@@ -63,4 +63,6 @@ def finished(model, file):
     model.separate_names()
     model.name_faces_of_node_sets()
     model.drop_ties_without_faces()
+    if not model.parts and not any(model.surfaces.values()):
+        raise Problem(f"{file}: no solid elements, and no shells with a property")
     return model

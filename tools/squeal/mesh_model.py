@@ -154,6 +154,14 @@ class Model:
         faces = [self.faces(number)[i] for number, i in owners[np.sort(alone)].tolist()]
         return {corners_of(face): face for face in faces}
 
+    def normal_of(self, surface):
+        """The mean normal of a surface's faces."""
+        total = np.zeros(3)
+        for face in self.surfaces[surface]:
+            a, b, c = (np.asarray(self.nodes[n]) for n in face[:3])
+            total += np.cross(b - a, c - a)
+        return (total / (np.linalg.norm(total) or 1)).tolist()
+
     def drop_loose_nodes(self):
         """Nodes of sets that no element has, such as reference nodes."""
         used = {node for _, nodes in self.elements.values() for node in nodes}
@@ -351,8 +359,6 @@ def write_msh(model, file):
     names = sorted({(dimension, name) for dimension, of, *_ in blocks for name in of})
     tags = {key: i for i, key in enumerate(names, 1)}
     used = sorted({node for *_, cells in blocks for cell in cells for node in cell})
-    if not any(dimension > 1 for dimension, *_ in blocks):
-        raise Problem(f"{model.source}: no solid and no shell elements")
     points = np.array([model.nodes[node] for node in used])
     box = " ".join(f"{v:.17g}" for v in (*points.min(axis=0), *points.max(axis=0)))
     entities = {dimension: {} for dimension in range(4)}  # names: number

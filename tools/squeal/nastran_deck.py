@@ -4,9 +4,10 @@ cards by the handlers of nastran_joining. Names come from the comments that prep
 import re
 from collections import Counter
 
-from squeal import nastran_joining
 import numpy as np
-from squeal.deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes, number, sections_of, undefined, whole
+from squeal import nastran_bolts
+from squeal import nastran_joining
+from squeal.deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes, number, sections_of, span, undefined, whole
 from squeal.mesh_model import FLAT, MOTIONS, Model, corners_of
 from squeal.nastran_properties import note_shell_fields, read_materials, read_properties
 
@@ -16,7 +17,7 @@ CORNERS = {"CHEXA": (8, 20), "CPENTA": (6, 15), "CTETRA": (4, 10), "CQUAD4": (4,
            "CQUAD8": (8, 8), "CPYRAM": (5, 13)}
 WITHOUT_ELEMENT = {("CPENTA", 15), ("CPYRAM", 5), ("CPYRAM", 13)}
 READ = {"GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "PSOLID", "PSHELL", "MAT1", "MAT9", "MATORT", "SPC", "SPC1", "SPCADD",
-        "SET1", "SET3", "PARAM", "ENDDATA", *CORNERS, *nastran_joining.READ}
+        "SET1", "SET3", "PARAM", "ENDDATA", *CORNERS, *nastran_joining.READ, *nastran_bolts.READ}
 
 
 class Deck:
@@ -119,6 +120,7 @@ def read_bdf(file):
             if card.name in nastran_joining.HANDLERS and (card.name == "SURF") == (name == "SURF"):
                 nastran_joining.HANDLERS[card.name](card, deck)
     nastran_joining.read_loads(cards, case, deck)
+    nastran_bolts.read_bolts(cards, case, deck)
     model.band = max((card.number(4, 0.0) for card in cards if card.name == "EIGRL"), default=0.0)
     return model
 
@@ -166,8 +168,9 @@ def names_in_comments(file):
     return names
 
 
-def listed(texts, place):
-    """Numbers of a list with THRU, BY and EXCEPT; what EXCEPT names is out while it is in the range before it."""
+def listed(texts, place, largest=0):
+    """Numbers of a list with THRU, BY and EXCEPT; what EXCEPT names is out while it is in the range before it. Ranges end at
+    the largest number that the deck has of what is listed, if that is given."""
     words, found, i = [text.upper() for text in texts if text], [], 0
 
     def number_at(i):
@@ -182,9 +185,9 @@ def listed(texts, place):
             last, i = number_at(i + 1), i + 2
         if words[i : i + 1] == ["BY"]:
             step, i = number_at(i + 1), i + 2
-        if last < first or step < 1:
-            raise Problem(f"{place}: {first} THRU {last} BY {step}: expected ascending numbers")
-        chosen = range(first, last + 1, step)
+        if last > largest >= first:
+            last = largest
+        chosen = span(first, last, step, place, "THRU")
         if words[i : i + 1] == ["EXCEPT"]:
             i += 1
             out = set()
@@ -207,7 +210,7 @@ def read_supports(cards, case, deck):
         if card.name in ("SPC", "SPC1") and card.whole(2) not in applied:
             continue
         if card.name == "SPC1":
-            nodes = [n for n in listed(card.fields[2:], card.place) if n in model.nodes]
+            nodes = [n for n in listed(card.fields[2:], card.place, max(model.nodes)) if n in model.nodes]
             held.setdefault((card.field(2), card.field(3), 0.0), []).extend(nodes)
         elif card.name == "SPC":
             for i in (3, 6):
@@ -294,21 +297,22 @@ def turned_nodes(cards):
 def read_sets(cards, case, deck):
     """SET1 is of nodes, SET and SET3 say what they are of; the case control's SET may be of nodes, elements or others."""
     model = deck.model
+    largest = max(*model.nodes, *model.elements, 0)
     for card in cards:
         name = deck.names.get(("SET", card.field(2)), f"set_{card.field(2)}")
         if card.name == "SET1":
-            add_set(model, name, listed(card.fields[1:], card.place), "GRID")
+            add_set(model, name, listed(card.fields[1:], card.place, largest), "GRID")
         elif card.name == "SET3":
-            add_set(model, name, listed(card.fields[2:], card.place), card.field(3).upper())
+            add_set(model, name, listed(card.fields[2:], card.place, largest), card.field(3).upper())
         elif card.name == "SET" and card.field(4).upper() in ("LIST", ""):
             kind = {"NODE": "GRID", "GRID": "GRID", "ELEM": "ELEM"}.get(card.field(3).upper(), card.field(3))
-            add_set(model, name, listed(card.fields[8:], card.place), kind)
+            add_set(model, name, listed(card.fields[8:], card.place, largest), kind)
             deck.surfaces.setdefault(card.field(2), name)
         elif card.name == "SET":
             deck.note(f"{name}, a SET of {card.field(3)} by {card.field(4)}", card)
     for number, items in re.findall(r"^\s*SET\s+(\d+)\s*=((?:[^\n]*,\s*\n)*[^\n]*)", case, flags=re.M | re.I):
         try:
-            numbers = listed(items.replace(",", " ").split(), "")
+            numbers = listed(items.replace(",", " ").split(), "", largest)
         except Problem:
             model.notes.append(f"SET {number} of the case control, which is no list of numbers")
             continue

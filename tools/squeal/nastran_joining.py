@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 from squeal.deck_files import Problem, undefined, whole
+from squeal.deck_joints import rectangle, tube
 from squeal.mesh_model import MOTIONS
 
 ALL = "123456"
@@ -143,7 +144,7 @@ def concentrated_mass(card, deck):
 
 
 def bar(card, deck):
-    """CBAR, CBEAM and CROD by PBAR, PBARL, PBEAM, PBEAML."""
+    """CBAR and CBEAM by PBAR, PBARL, PBEAM, PBEAML."""
     section, material = None, None
     for name in BAR_PROPERTIES:
         if found := deck.properties.get((name, card.field(3))):
@@ -174,14 +175,9 @@ def section_of(card):
     if kind == "ROD" and sizes[0] > 0:
         return {"diameter": 2 * sizes[0], "shear_factor": 0.9}
     if kind == "TUBE" and sizes[0] > sizes[1] >= 0:
-        bending = np.pi / 4 * (sizes[0] ** 4 - sizes[1] ** 4)
-        return {"area": np.pi * (sizes[0] ** 2 - sizes[1] ** 2), "bending": [bending], "torsion": 2 * bending, "shear_factor": 0.5}
+        return tube(*sizes[:2])
     if kind == "BAR" and min(sizes[:2]) > 0:
-        width, height = sizes[:2]
-        long, short = max(width, height), min(width, height)
-        torsion = long * short**3 * (1 / 3 - 0.21 * short / long * (1 - short**4 / (12 * long**4)))
-        return {"area": width * height, "bending": [width * height**3 / 12, height * width**3 / 12], "torsion": torsion,
-                "shear_factor": 5 / 6}
+        return rectangle(*sizes[:2])
     return None
 
 
@@ -211,7 +207,7 @@ def pressure(card, deck, factor):
         deck.note(f"the direction of PLOAD4 on element {card.field(3)}: it acts along the normal", card)
     first, last = card.whole(3), card.whole(9) if card.field(8) == "THRU" else card.whole(3)
     grids = [] if card.field(8) == "THRU" else [int(card.field(i)) for i in (8, 9) if card.field(i).isdecimal()]
-    for number in range(first, last + 1):
+    for number in [first] if first == last else [n for n in deck.model.elements if first <= n <= last]:
         face = deck.face_of(number, grids)
         if face is None and first == last:
             deck.note(f"PLOAD4 on element {number}: no such face", card)
