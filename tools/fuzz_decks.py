@@ -200,13 +200,15 @@ ANSYS = """/COM,ANSYS RELEASE 19.2
 ET,1,185
 ET,2,170
 ET,3,174
+ET,4,179
+ET,5,154
 NBLOCK,6,SOLID,16,16
 (3i9,6e21.13e3)
 """ + "".join(f"{i:9d}{0:9d}{0:9d}{x:21.13E}{y:21.13E}{z:21.13E}\n" for i, (x, y, z) in enumerate(AT, 1)) + """N,R5.3,LOC,       -1,
 EBLOCK,19,SOLID,4,4
 (19i9)
 """ + "".join("".join(f"{v:9d}" for v in [m, kind, 7, 1, 0, 0, 0, 0, len(of), 0, n, *of]) + "\n" for n, m, kind, of in (
-    (1, 1, 1, range(1, 9)), (2, 1, 1, [9, 10, 11, 11, 13, 14, 15, 15]), (3, 3, 2, range(5, 9)), (4, 3, 3, [9, 10, 11, 11]))) + """       -1
+    (1, 1, 1, range(1, 9)), (2, 1, 1, [9, 10, 11, 11, 13, 14, 15, 15]), (3, 3, 2, range(5, 9)), (4, 3, 3, [9, 10, 11, 11]), (5, 1, 4, [5, 9, 40]))) + """       -1
 CMBLOCK,BASE,NODE,       2
 (8i10)
          1        -4
@@ -222,6 +224,23 @@ D,      2,ALL ,  0.00000000    ,  0.00000000
 F,13,FZ,-8.,0.
 F,14,FZ,-8.,0.
 KEYOPT,3,12,0
+N,30,1.,1.,2.,45.
+N,40,.5,.5,3.
+CE,R5.0,DEFI,4,1,0.
+CE,R5.0,NODE,13,UX,1.,40,UX,-1.
+CE,R5.0,NODE,40,ROTY,1.,40,ROTZ,-.5
+CE,2,0,14,UZ,1,40,UZ,-1
+SECTYPE,4,PRETENSION,,M12
+SECDATA,40,0.,0.,1.
+SLOAD,4,PL01,LOCK,FORC,500.,1,2
+SECTYPE,5,SHELL
+SECBLOCK,1
+ 0.002, 1, 0, 3
+SFE,2,2,PRES,1,3.E5,3.E5,3.E5,3.E5
+SFE,1,1,PRES,0,R5.0
+ 3.E5 3.E5 3.E5 3.E5
+OMEGA,0,0,3.
+BETAD,1.E-7
 CMROTATE,LOW,,,10.
 ACEL,0.,0.,9.81
 FINISH

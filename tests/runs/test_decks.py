@@ -262,7 +262,7 @@ def test_commands_of_ansys(tmp_path, squeal):
             "MPDATA,R5.0, 1,MU  ,     3, 1, 0.400000000    ,\nF,13,FZ,-8.,0.\nACEL,0.,0.,9.81\nCE,R5.0,DEFI,2,1,0.\n"
             + "".join(f"D,{n},{label},0.,0.\n" for n in range(1, 5) for label in ("UX", "UY", "UZ")))
     scene, left_out = converted(tmp_path, cdb(rows, more), "deck.cdb")
-    assert left_out == ["the commands CE (1)"]
+    assert left_out == ["CE: 1 equation of no rigid coupling between a node of elements and one of none (line 45)"]
     assert [part["name"] for part in scene["part"]] == ["material_1"] and scene["part"][0]["young"] == 2e11
     assert scene["support"] == [{"on": "BASE", "fixed": "x y z"}] and scene["gravity"] == [0, 0, -9.81]
     assert scene["force"] == [{"on": "node_13", "vector": [0, 0, -8]}]
@@ -300,6 +300,69 @@ def test_masses_of_ansys(tmp_path, constants):
     scene, left_out = converted(tmp_path, deck, "deck.cdb")
     assert scene["rigid_body"][0]["mass"] == 2 and scene["rigid_body"][0]["inertia"] == [0.1, 0.2, 0.3, 0, 0, 0]
     assert scene["mass"] == [{"on": "node_13", "mass": 2}] and left_out == []
+
+
+def rigid_equations(leader, at, scale=-2.0):
+    """What CERIG makes: of each follower and motion, its own term and those of the leading node."""
+    lines = []
+    for node in (13, 14, 15, 16):
+        arm = np.subtract(AT[node - 1], at)
+        for i, label in enumerate(("UX", "UY", "UZ")):
+            turning = np.cross(arm, np.eye(3)[i])
+            terms = [(node, label, scale), (leader, label, -scale)]
+            terms += [(leader, "ROT" + axis, -scale * v) for axis, v in zip("XYZ", turning) if v]
+            lines.append(f"CE,R5.0,DEFI,{len(terms):8d},{len(lines) + 1:8d}, 0.00000000    \n")
+            lines += ["CE,R5.0,NODE," + ",".join(f"{n:8d},{of:4s}, {v:.8f}    " for n, of, v in terms[k : k + 2]) + "\n" for k in range(0, len(terms), 2)]
+    return "".join(lines)
+
+
+@pytest.mark.parametrize("group", [True, False])
+def test_rigid_regions_of_ansys(tmp_path, group):
+    """Equations of a rigid region are a coupling; with a coefficient that is no rigid motion they are left out and said."""
+    equations = rigid_equations(17, (0.5, 0.5, 3)) if group else rigid_equations(17, (0.7, 0.9, 4))
+    scene, left_out = converted(tmp_path, cdb(BRICK_ROWS, "D,1,ALL,0,,4\n" + equations, [*AT, (0.5, 0.5, 3)]), "deck.cdb")
+    assert ("rigid_body" in scene) == group and (left_out == []) == group
+    if group:
+        assert scene["rigid_body"] == [{"name": "node_17", "surfaces": "region_17", "at": [0.5, 0.5, 3], "free": "all"}]
+    else:
+        assert left_out[0].startswith("CE: 12 equations of no rigid coupling")
+
+
+@pytest.mark.parametrize("tension", ["F,21,FX,500.,0.\n", "SLOAD,4,PL01,LOCK,FORC,500.,1,2\n"])
+def test_bolts_of_ansys(tmp_path, squeal, tension):
+    """A shank that PRETS179 cuts: its sides are joined again, and their faces are the section of a [[bolt]]."""
+    at = [(x, y, z) for z in (0, 1, 1, 2) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))] + [(0, 0, 2), (1, 0, 2), (1, 1, 2), (0, 1, 2), (0, 0, 9)]
+    rows = [*BRICK_ROWS, *((10 + i, 1, 5, 0, [5 + i, 9 + i, 21]) for i in range(4))]
+    more = "SECTYPE,       4,PRETENSION,     ,M12\nSECDATA,      21, 0.0, 0.0, 1.0\nD,1,ALL,0,,4\nD,13,UX,0,,16,,UY,UZ\n" + tension
+    deck = cdb(rows, more, at).replace("ET,4,186\n", "ET,4,186\nET,5,179\n")
+    for label in range(10, 14):  # the section of these elements
+        deck = deck.replace("".join(f"{v:9d}" for v in (1, 5, 0, 1, 0, 0, 0, 0, 3, 0, label)), "".join(f"{v:9d}" for v in (1, 5, 0, 4, 0, 0, 0, 0, 3, 0, label)))
+    scene, left_out = converted(tmp_path, deck, "deck.cdb")
+    assert left_out == [] and "force" not in scene and "point" not in scene
+    assert scene["bolt"] == [{"name": "M12", "section": "M12_section", "tension": 500, "axis": [0, 0, 1]}]
+    assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
+
+
+def test_axes_of_nodes_of_ansys(tmp_path):
+    """Nodes that are turned about z hold the radial motion; a force on one of them is along its own x axis."""
+    turned = "".join(f"N,{n},{x},{y},{z},{np.degrees(np.arctan2(y, x)) if x or y else 0}\n" for n, (x, y, z) in enumerate(AT[:4], 1) if x or y)
+    scene, left_out = converted(tmp_path, cdb(BRICK_ROWS, turned + "D,2,UX,0,,4\nF,4,FX,-3.\nD,13,ALL,0,,16\n"), "deck.cdb")
+    assert left_out == [] and scene["support"][0] == {"on": "held_1", "fixed": "x"}  # of node 2, which is not turned
+    assert scene["support"][1] == {"on": "held_2", "fixed": "x", "cylinder": {"axis": [0, 0, 1], "centre": [0, 0, 0]}}
+    assert scene["force"] == [{"on": "node_4", "vector": pytest.approx([0, -3, 0], abs=1e-12)}]
+
+
+def test_pressures_damping_and_thickness_of_ansys(tmp_path):
+    """SFE on a solid and on a SURF154 of its face, damping of all, layers of a shell, and what no scene has."""
+    rows = [*BRICK_ROWS, (3, 1, 5, 1, [13, 14, 15, 16]), (4, 1, 6, 1, [1, 4, 3, 2])]
+    more = ("SFE,2,2,PRES,1,3.E5,3.E5,3.E5,3.E5\nSFE,3,1,PRES,0,R5.0\n 3.E5 3.E5 3.E5 3.E5\nBETAD,2E-7\nDMPSTR,0.01\nSECTYPE,1,SHELL\n"
+            "SECBLOCK,2\n 0.002, 1, 0, 3\n 0.003, 1, 0, 3\nOMEGA,0,0,12\nCGOMEGA,0,0,0\n")
+    scene, left_out = converted(tmp_path, cdb(rows, more).replace("ET,4,186\n", "ET,4,186\nET,5,154\nET,6,181\n"), "deck.cdb")
+    assert [part.get("thickness") for part in scene["part"]] == [None, 0.005] and scene["part"][0]["beta"] == 2e-7
+    assert scene["part"][0]["loss_factor"] == 0.01 and scene["pressure"] == [{"on": "pressed", "value": 3e5}]
+    model = TOOL.read_deck(tmp_path / "deck.cdb")
+    assert {frozenset(face) for face in model.surfaces["pressed"]} == {frozenset((9, 10, 14, 13)), frozenset((13, 14, 15, 16))}
+    assert left_out == ["OMEGA,0,0,12 (line 47)"]
 
 
 def test_nodes_with_one_force_are_a_group(tmp_path):

@@ -5,27 +5,27 @@ import re
 from collections import Counter
 
 import numpy as np
+from squeal import ansys_equations
 from squeal import ansys_joining
+from squeal import ansys_loads
 from squeal.ansys_joining import Side
 from squeal.common import counted
 from squeal.deck_files import Problem, lines_of, number, span, whole
-from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part
+from squeal.mesh_model import FLAT, KINDS, Model, Part
 
 # squeal's kinds by element type and by the number of different nodes
 SOLIDS = {45: 8, 65: 8, 185: 8, 190: 8, 95: 20, 186: 20, 92: 10, 187: 10, 285: 4}
 SHELLS = {63: 4, 181: 4, 43: 4}
 TARGETS, CONTACTS = {169, 170}, {171, 172, 173, 174, 175, 177}
-SKINS = {152: 4, 154: 8}
-MOTION_OF = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "rx", "ROTY": "ry", "ROTZ": "rz"}
-FORCE_OF = {name: i for i, name in enumerate(("FX", "FY", "FZ", "MX", "MY", "MZ"))}
+SKINS = {152, 154}
 ELASTIC = {"EX": "young", "PRXY": "poisson", "NUXY": "poisson", "DENS": "density", "DMPR": "loss_factor", "BETD": "beta", "ALPD": "alpha"}
 ORTHOTROPIC = ("EX", "EY", "EZ", "PRXY", "PRXZ", "PRYZ", "GXY", "GXZ", "GYZ")
 # hexahedra that stand for wedges and tetrahedra: which of their corners and mid-sides are the other's
 WEDGE_OF = [0, 1, 2, 4, 5, 6]
 TET_OF = [0, 1, 2, 4]
-SILENT = set("/COM /NOPR /GOPR /PREP7 /TITLE /SOLU /GO /OUTPUT /UNITS /VIEW /AUTO FINISH NUMOFF *IF *ELSE *ENDIF *SET DOF N R5.3 MPTEMP "
-             "EXTOPT TREF IRLF BFUNIF ACEL OMEGA DOMEGA CGLOC CGOMEGA DCGOMG KUSE TIME ALPHAD BETAD DMPRAT DMPSTR CRPLIM NCNV "
-             "NEQIT ERESX TOFFST SECTYPE SECBLOCK ANTYPE ETBLOCK LSCLEAR FCUM DELTIM KBC SHPP SHELL".split())
+SILENT = set("/COM /NOPR /GOPR /PREP7 /TITLE /SOLU /GO /OUTPUT /UNITS /VIEW /AUTO FINISH NUMOFF *IF *ELSE *ENDIF *SET DOF MPTEMP "
+             "EXTOPT TREF IRLF BFUNIF CGLOC KUSE TIME CRPLIM NCNV "
+             "NEQIT ERESX TOFFST ANTYPE ETBLOCK LSCLEAR FCUM DELTIM KBC SHPP SHELL".split())
 
 
 class Deck:
@@ -44,8 +44,14 @@ class Deck:
         self.held = {}
         self.bodies = {}  # elements by material and type
         self.left_out, self.other_elements = Counter(), Counter()
-        self.bolts = {}  # section of a bolt: elements' nodes, by section number
-        self.tension = {}
+        self.angles = {}  # [degrees] about z, x and y, of nodes whose motions are along other axes
+        self.skins, self.pressed = {}, []  # nodes of surface elements; (element, face, value, place)
+        self.equations, self.numbered = [], {}
+        self.bolts = {}  # (place, nodes) of PRETS179, by section
+        self.section, self.is_pretension = 0, False  # that data are of
+        self.section_names, self.directions, self.tension, self.thickness = {}, {}, {}, {}  # by section
+        self.systems = Counter()  # elements by material and coordinate system
+        self.alpha = self.beta = 0.0
 
     def note(self, what, place):
         self.model.notes.append(f"{what} ({place.rpartition(', ')[2]})")
@@ -122,9 +128,22 @@ def read_nodes(words, lines, deck):
         fields = fields_of(line, widths)
         position = [number(field or "0", lines.place()) for field in fields[first : first + 3]]
         label = whole(fields[0], lines.place())
-        if not 0 < label < 2**31:
-            raise Problem(f"{lines.place()}: node {label}: expected a number from 1 to {2**31 - 1}")
-        deck.model.nodes[label] = np.array(position + [0.0] * (3 - len(position)))
+        add_node(deck, label, position, [number(field or "0", lines.place()) for field in fields[first + 3 : first + 6]], lines.place())
+
+
+def add_node(deck, label, position, angles, place):
+    if not 0 < label < 2**31:
+        raise Problem(f"{place}: node {label}: expected a number from 1 to {2**31 - 1}")
+    deck.model.nodes[label] = np.array(position + [0.0] * (3 - len(position)))
+    if any(angles):
+        deck.angles[label] = (angles + [0.0] * 3)[:3]
+
+
+def node(words, place, deck):
+    """N,node,x,y,z,angles; N,R5.3 is the end of a block."""
+    if len(words) > 1 and not words[1].upper().startswith("R"):
+        values = [number(word or "0", place) for word in words[2:8]]
+        add_node(deck, whole(words[1], place), values[:3], values[3:], place)
 
 
 def read_elements(words, lines, deck):
@@ -149,7 +168,7 @@ def read_elements(words, lines, deck):
             values += [whole(field, place) for field in fields_of(lines.next(), widths)]
         if len(values) != 11 + count:
             raise Problem(f"{place}: {len(values) - 11} nodes; expected {count}")
-        add_element(deck, place, values[10], values[:4], values[11:])
+        add_element(deck, place, values[10], values[:5], values[11:])
 
 
 def kind_of(kind, nodes, place):
@@ -178,12 +197,13 @@ def kind_of(kind, nodes, place):
 
 
 def add_element(deck, place, label, attributes, nodes):
-    material, kind_number, real, section = attributes
+    material, kind_number, real, section, system = attributes
     kind, model = deck.types.get(kind_number), deck.model
     if kind in SOLIDS:
         shape, nodes = kind_of(kind, nodes, place)
         model.add_element(place, label, shape, nodes, "abaqus")
         deck.bodies.setdefault((material, 0), []).append(label)
+        deck.systems[material, system] += system != 0
     elif kind in SHELLS:
         shape = "tri3" if nodes[2] == nodes[3] else "quad4"
         model.add_element(place, label, shape, nodes[: 3 if shape == "tri3" else 4], "abaqus")
@@ -196,6 +216,8 @@ def add_element(deck, place, label, attributes, nodes):
             deck.of_pair[real] |= {"material": material, "type": kind_number}
     elif kind == 179:
         deck.bolts.setdefault(section, []).append((place, nodes))
+    elif kind in SKINS:
+        deck.skins[label] = face_of(nodes)
     elif kind == 21:
         deck.masses.append((place, nodes[0], real, kind_number))
     else:
@@ -250,7 +272,7 @@ def read_reals(words, lines, deck):
         deck.reals[whole(fields[0], place)] = values
 
 
-BLOCKS = {"RLBLOCK": read_reals, "NBLOCK": read_nodes, "EBLOCK": read_elements, "CMBLOCK": read_component}
+BLOCKS = {"RLBLOCK": read_reals, "SECBLOCK": ansys_equations.section_block, "SFE": ansys_loads.surface_load, "NBLOCK": read_nodes, "EBLOCK": read_elements, "CMBLOCK": read_component}
 
 # ---- commands
 
@@ -275,37 +297,6 @@ def material_data(words, place, deck):
     deck.constants.setdefault(whole(material, place), {})[label.upper()] = number(value, place)
 
 
-def support(words, place, deck):
-    """D,node,label,value; a range of nodes has its end in the fifth word."""
-    node, label = whole(words[1] if len(words) > 1 else "", place), words[2].upper() if len(words) > 2 else ""
-    value = number(words[3] or "0", place) if len(words) > 3 else 0.0
-    motions = {"ALL": MOTIONS}.get(label, (MOTION_OF[label],) if label in MOTION_OF else ())
-    if not motions:
-        deck.note(f"D of {label} of node {node}", place)
-        return
-    for motion in motions:
-        deck.held.setdefault(node, {})[motion] = value
-
-
-def force(words, place, deck):
-    node, label = whole(words[1] if len(words) > 1 else "", place), words[2].upper() if len(words) > 2 else ""
-    if label not in FORCE_OF:
-        deck.note(f"F of {label} on node {node}", place)
-        return
-    found = deck.model.joints.forces.setdefault(node, [0.0] * 6)
-    found[FORCE_OF[label]] = number(words[3] if len(words) > 3 else "", place)
-
-
-def equation(words, place, deck):
-    deck.left_out["CE"] += 1
-
-
-def gravity(words, place, deck):
-    values = [number(word or "0", place) for word in (words[1:] + ["0"] * 3)[:3]]
-    if any(values):
-        deck.model.gravity = [-v for v in values]  # an acceleration of the frame
-
-
 def key_option(words, place, deck):
     if len(words) > 3:
         deck.options[whole(words[1], place), whole(words[2], place)] = whole(words[3] or "0", place)
@@ -323,7 +314,9 @@ def rotation(words, place, deck):
         deck.turning.append((words[1] if len(words) > 1 else "", rate, place))
 
 
-COMMANDS = {"R": real_constants, "CMROTATE": rotation, "KEYOPT": key_option, "ET": element_type, "MPDATA": material_data, "MP": material_data, "D": support, "F": force, "CE": equation, "ACEL": gravity}
+COMMANDS = {"R": real_constants, "CMROTATE": rotation, "KEYOPT": key_option, "ET": element_type, "MPDATA": material_data, "MP": material_data,
+            "N": node, "CE": ansys_equations.read_equation, "SECTYPE": ansys_equations.section_type, "SECDATA": ansys_equations.section_data,
+            "SLOAD": ansys_equations.section_load, **ansys_loads.COMMANDS}
 
 
 # ---- what the whole deck makes
@@ -338,14 +331,14 @@ def finish(deck):
     several = Counter(material for material, _ in deck.bodies)
     for (material, section), elements in deck.bodies.items():
         name = f"material_{material}" + (f"_shells_{section}" if section and several[material] > 1 else "")
-        model.parts[model.unused(name)] = Part(elements, material)
+        model.parts[model.unused(name)] = Part(elements, material, deck.thickness.get(section, 0.0) if section else 0.0)
+    ansys_equations.bolts(deck)
+    ansys_equations.rigid_regions(deck)
     rotors = ansys_joining.rotors_of(deck)
     name_parts(deck)
-    supports(deck)
+    ansys_loads.finish(deck)
     ansys_joining.pairs(deck, rotors)
     ansys_joining.masses(deck)
-    for section, elements in deck.bolts.items():
-        deck.note(f"the bolt of section {section}: {len(elements)} PRETS179, whose two sides have nodes of their own", elements[0][0])
     model.notes += [f"{counted(count, 'element')} of {name}" for name, count in sorted(deck.other_elements.items())]
     if deck.left_out:
         model.notes.append("the commands " + ", ".join(f"{name} ({count})" for name, count in sorted(deck.left_out.items())))
@@ -376,30 +369,19 @@ def name_parts(deck):
 def material_of(constants, material, deck):
     if all(label in constants for label in ORTHOTROPIC):
         values = [constants[label] for label in ORTHOTROPIC]
-        return {"orthotropic": {"young": values[:3], "poisson": values[3:6], "shear": values[6:]}, "density": constants.get("DENS", 0.0)}
+        for (of, system), count in deck.systems.items():
+            if of == material and count:
+                deck.model.notes.append(f"the coordinate system {system} of {counted(count, 'element')}: material {material} has the basic axes")
+        return {"orthotropic": {"young": values[:3], "poisson": values[3:6], "shear": values[6:]}, "density": constants.get("DENS", 0.0),
+                **damping_of(constants, deck)}
     others = set(constants) - set(ELASTIC) - {"MU", "GXY", "ALPX", "CTEX", "REFT", "KXX", "C"}
     if others and "EX" in constants:
         deck.model.notes.append(f"{', '.join(sorted(others))} of material {material}")
-    return {ELASTIC[label]: value for label, value in constants.items() if label in ELASTIC}
+    return {ELASTIC[label]: value for label, value in constants.items() if label in ELASTIC} | damping_of(constants, deck)
 
 
-def supports(deck):
-    """Nodes that are held alike are a set, by the name of the component that has just these."""
-    model = deck.model
-    used = {node for _, nodes in model.elements.values() for node in nodes}
-    alike = {}
-    for node, held in deck.held.items():
-        if node not in model.nodes:
-            model.notes.append(f"the support of node {node}, which the deck does not define")
-        elif node in used:
-            alike.setdefault(tuple(sorted(held.items())), []).append(node)
-        else:
-            model.joints.held[node] = set(held)
-    names = {frozenset(nodes): name for name, nodes in model.node_sets.items()}
-    for i, (held, nodes) in enumerate(alike.items(), 1):
-        motions = [m for m in MOTIONS if m in dict(held)]
-        name = names.get(frozenset(nodes)) or model.unused(f"held_{i}")
-        model.node_sets[name] = nodes
-        values = [dict(held).get(m, 0.0) for m in MOTIONS]
-        keys = {"displacement": values[:3]} if any(values[:3]) else {}
-        model.supports.append((name, motions, keys | ({"rotation": values[3:]} if any(values[3:]) else {})))
+def damping_of(constants, deck):
+    """That of the material, to which ALPHAD and BETAD of all add."""
+    found = {"alpha": constants.get("ALPD", 0.0) + deck.alpha, "beta": constants.get("BETD", 0.0) + deck.beta,
+             "loss_factor": constants.get("DMPR", 0.0)}
+    return {key: value for key, value in found.items() if value}

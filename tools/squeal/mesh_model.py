@@ -154,6 +154,22 @@ class Model:
         faces = [self.faces(number)[i] for number, i in owners[np.sort(alone)].tolist()]
         return {corners_of(face): face for face in faces}
 
+    def join_nodes(self, same):
+        """Nodes of elements and sets become others, which are at the same places."""
+        for n, (kind, nodes) in self.elements.items():
+            if not same.keys().isdisjoint(nodes):
+                self.elements[n] = kind, tuple(same.get(node, node) for node in nodes)
+        for name, nodes in self.node_sets.items():
+            self.node_sets[name] = list(dict.fromkeys(same.get(node, node) for node in nodes))
+        self.free_of_all = (-1, {})
+
+    def press(self, pressed):
+        """Faces by their pressures become surfaces."""
+        for i, (value, faces) in enumerate(pressed.items(), 1):
+            name = self.unused("pressed" if len(pressed) == 1 else f"pressed_{i}")
+            self.surfaces[name] = faces
+            self.pressures.append((name, {"value": value}))
+
     def normal_of(self, surface):
         """The mean normal of a surface's faces."""
         total = np.zeros(3)

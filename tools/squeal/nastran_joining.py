@@ -255,10 +255,7 @@ def read_loads(cards, case, deck):
     others = known - set(factors)
     if others:
         deck.model.notes.append(f"loads {', '.join(map(str, sorted(others)))}, which the case control does not select")
-    for i, (size, faces) in enumerate(deck.pressed.items(), 1):
-        name = deck.model.unused("pressed" if len(deck.pressed) == 1 else f"pressed_{i}")
-        deck.model.surfaces[name] = faces
-        deck.model.pressures.append((name, {"value": size}))
+    deck.model.press(deck.pressed)
 
 
 # ---- surfaces and contacts of OptiStruct
