@@ -196,6 +196,34 @@ def test_bolts_of_optistruct_and_simcenter(tmp_path, squeal, section, axis):
     assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
 
 
+@pytest.mark.parametrize("card, words", [
+    ("PBAR,3,1,4.-2,1.-4,2.-4,3.-4\nCBAR,9,3,100,101,1.,0.,0.\n,45\n", "released motions of CBAR 9"),
+    ("PBAR,3,1,4.-2,1.-4,2.-4,3.-4\nCBAR,9,3,100,101,1.,0.,0.\n,,,,,1.\n", "offsets of CBAR 9"),
+    ("PELAS,3,5.,.1\nCELAS1,9,3,100,1\n", "loss factor .1 of CELAS1 9"), ("CELAS2,9,5.,100,1,,,.1\n", "loss factor .1 of CELAS2 9"),
+    ("CONM2,9,100,3,5.\n", "coordinate system 3 of CONM2 9"), ("PBUSH,3,K,1.,,,,,\n,RCV,1.\nCBUSH,9,3,100,101,1.,0.,0.\n", "RCV of PBUSH 3"),
+])
+def test_fields_that_no_scene_has_are_said(tmp_path, card, words):
+    _, left_out = converted(tmp_path, GRIDS + card, "deck.bdf")
+    assert len(left_out) == 1 and words in left_out[0]
+
+
+@pytest.mark.parametrize("card", ["EIGRL,5,,9000.\n", "EIGR,5,LAN,,9000.\n", "EIGRA,5,,9000.\n"])
+def test_the_band_of_bulk_data(tmp_path, card):
+    scene, left_out = converted(tmp_path, GRIDS + card, "deck.bdf")
+    assert scene["modes"] == {"band": 9000} and left_out == []
+
+
+def test_a_range_may_end_beyond_the_deck(tmp_path):
+    """THRU 99999999 is what preprocessors write for all; a longer one than any deck has is refused where nothing bounds it."""
+    text = GRIDS.replace("SPC1,1,123,1,2,3,4", "SPC1,1,123,1,THRU,2147483646") + "SET1,7,5,THRU,99999999\n"
+    converted(tmp_path, text, "deck.bdf")
+    model = TOOL.read_deck(tmp_path / "deck.bdf")
+    assert set(model.surfaces) >= {"set_7"} and model.supports[0][1] == ["x", "y", "z"]
+    (tmp_path / "deck.bdf").write_text(GRIDS + "RBE2,7,100,123,1,THRU,99999999\n")
+    with pytest.raises(TOOL.Problem, match="1 THRU 99999999"):
+        TOOL.read_deck(tmp_path / "deck.bdf")
+
+
 def test_nodes_and_weights_of_mean_couplings(tmp_path):
     """RBE3 of two weights: the nodes of each are a group."""
     scene, left_out = converted(tmp_path, GRIDS + "RBE3,7,,100,123,1.,123,13,14\n,2.,123,15,16\n", "deck.bdf")

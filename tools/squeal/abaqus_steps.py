@@ -84,7 +84,7 @@ def friction(block, deck):
             deck.note("*FRICTION by pressure or temperature: its lines are taken for speeds", block.place)
     else:
         keys["friction"] = first[0]
-        if len(first) > 1 and first[1] > 0:
+        if len(first) > 1 and first[1] > 0 and "ANISOTROPIC" not in block.options:
             keys["slip_compliance"] = 1 / first[1]  # CalculiX's slope of sticking
 
 
@@ -335,5 +335,5 @@ OPTIONS = {"FREQUENCY": "EIGENSOLVER,NORMALIZATION,SOLVER,STORAGE,GLOBAL,CYCMPC,
            "SURFACE INTERACTION": "NAME,USER,PAD THICKNESS", "CHANGE FRICTION": "INTERACTION,RESET",
            "FRICTION": "SLIP TOLERANCE,EXPONENTIAL DECAY,ROUGH,LAGRANGE,ELASTIC SLIP",
            "SURFACE BEHAVIOR": "PRESSURE-OVERCLOSURE,AUGMENTED LAGRANGE,PENALTY,DIRECT", "TIE": "NAME,ADJUST,TYPE,CONSTRAINT RATIO,NO ROTATION",
-           "CONTACT PAIR": "INTERACTION,TYPE,ADJUST,SMALL SLIDING,TIED,MECHANICAL CONSTRAINT,CPSET,TRACKING,SUPPLEMENTARY CONSTRAINTS",
+           "CONTACT PAIR": "INTERACTION,TYPE,SMALL SLIDING,TIED,MECHANICAL CONSTRAINT,CPSET,TRACKING,SUPPLEMENTARY CONSTRAINTS",
            "CLEARANCE": "SLAVE,MASTER,VALUE", "MOTION": "TRANSLATION,ROTATION,TYPE", "CLOAD": "OP", "DSLOAD": "OP", "DLOAD": "OP"}

@@ -15,8 +15,9 @@ ELEMENTS = {("CHEXA", 8): "hex8", ("CHEXA", 20): "hex20", ("CPENTA", 6): "wedge6
             ("CTETRA", 10): "tet10", ("CQUAD4", 4): "quad4", ("CTRIA3", 3): "tri3", ("CTRIA6", 6): "tri6", ("CQUAD8", 8): "quad8"}
 CORNERS = {"CHEXA": (8, 20), "CPENTA": (6, 15), "CTETRA": (4, 10), "CQUAD4": (4, 4), "CTRIA3": (3, 3), "CTRIA6": (6, 6),
            "CQUAD8": (8, 8), "CPYRAM": (5, 13)}
+UPPER = {"EIGRL": 4, "EIGRA": 4, "EIGR": 5}  # fields of the highest frequency
 WITHOUT_ELEMENT = {("CPENTA", 15), ("CPYRAM", 5), ("CPYRAM", 13)}
-READ = {"GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "PSOLID", "PSHELL", "MAT1", "MAT9", "MATORT", "SPC", "SPC1", "SPCADD",
+READ = {*UPPER, "GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "PSOLID", "PSHELL", "MAT1", "MAT9", "MATORT", "SPC", "SPC1", "SPCADD",
         "SET1", "SET3", "PARAM", "ENDDATA", *CORNERS, *nastran_joining.READ, *nastran_bolts.READ}
 
 
@@ -121,7 +122,7 @@ def read_bdf(file):
                 nastran_joining.HANDLERS[card.name](card, deck)
     nastran_joining.read_loads(cards, case, deck)
     nastran_bolts.read_bolts(cards, case, deck)
-    model.band = max((card.number(4, 0.0) for card in cards if card.name == "EIGRL"), default=0.0)
+    model.band = max((card.number(UPPER[card.name], 0.0) for card in cards if card.name in UPPER), default=0.0)
     return model
 
 

@@ -73,9 +73,11 @@ def scalar(card, deck):
         found = deck.properties.get(("PELAS" if key == "stiffness" else "PDAMP", card.field(3)))
         if found is None:
             raise no_property(card, deck, ("PELAS", "PDAMP"))
-        value = found.number(3, 0.0)
+        value, loss = found.number(3, 0.0), found.field(4) if found.name == "PELAS" else ""
     else:
-        value = card.number(3, 0.0)
+        value, loss = card.number(3, 0.0), card.field(8) if key == "stiffness" else ""
+    if loss.strip("0."):
+        deck.note(f"the loss factor {loss} of {card.name} {card.field(2)}", card)
     ends = [(card.whole(4 + i), card.whole(5 + i, 0)) for i in (0, 2) if card.field(4 + i) not in ("", "0")]
     motions = {motion for _, motion in ends}
     if len(motions) != 1 or not 1 <= min(motions) <= 6 or any(node in deck.turned for node, _ in ends):
@@ -119,6 +121,8 @@ def constants_of(found, deck):
     keys, fields, i = {}, found.fields[1:], 0
     while i < len(fields):
         word, i = fields[i], i + 1
+        if word and not word[0].isdigit() and word[0] not in "+-." and word not in ("K", "B", "GE"):
+            deck.note(f"{word} of PBUSH {found.field(2)}", found)
         if word in ("K", "B", "GE"):
             values = [deck.number(text or "0", found) for text in (fields[i : i + 6] + [""] * 6)[:6]]
             if word == "GE":
@@ -135,6 +139,8 @@ def concentrated_mass(card, deck):
     offset = [card.number(i, 0.0) for i in (6, 7, 8)]
     i11, i21, i22, i31, i32, i33 = (card.number(i, 0.0) for i in range(10, 16))
     joints.mass[node] = joints.mass.get(node, 0.0) + mass
+    if card.field(4) not in ("", "0"):
+        deck.note(f"the coordinate system {card.field(4)} of CONM2 {card.field(2)}: its moments are about the basic axes", card)
     if any(offset):
         deck.note(f"the offset {offset} of CONM2 {card.field(2)}: its mass is at node {node}", card)
     if any((i21, i31, i32)):
@@ -156,6 +162,9 @@ def bar(card, deck):
         deck.note(f"{card.name} {card.field(2)}, of a section or material that is not read", card)
         return
     a, b = card.whole(4), card.whole(5)
+    for what, fields in BAR_FIELDS.items():
+        if any(card.field(i).strip("0.") for i in fields):
+            deck.note(f"{what} of {card.name} {card.field(2)}", card)
     keys = {"young": material["young"], "poisson": material["poisson"],
             **({"density": material["density"]} if material.get("density") else {}), **section, "elements": 1}
     frame = deck.frame_between(card, a, b, 6) if a in deck.model.nodes and b in deck.model.nodes else None
@@ -325,6 +334,7 @@ def friction_of(card, deck):
 HANDLERS = {"RBE2": rigid, "RBAR": rigid_bar, "RBE3": mean, "CELAS1": scalar, "CELAS2": scalar, "CDAMP1": scalar, "CDAMP2": scalar,
             "CBUSH": bushing, "CONM2": concentrated_mass, "CBAR": bar, "CBEAM": bar, "SURF": surface, "CONTACT": contact,
             "TIE": contact}
+BAR_FIELDS = {"the released motions": (10, 11), "the offsets": range(12, 18)}
 BAR_PROPERTIES = ("PBAR", "PBARL", "PBEAM", "PBEAML")
 PROPERTIES = {"PELAS", "PDAMP", "PBUSH", "PBAR", "PBARL", "PBEAM", "PBEAML", "PCONT"}
-READ = {*HANDLERS, *PROPERTIES, *LOADS, "LOAD", "EIGRL", "EIGC", "SET"}
+READ = {*HANDLERS, *PROPERTIES, *LOADS, "LOAD", "EIGC", "SET"}
