@@ -74,10 +74,20 @@ std::vector<std::string> argument_names()
   return names;
 }
 
+/// Whether a word asks for a number of ranks, which only the launcher can give.
+bool asks_for_ranks(const std::string& word)
+{
+  const std::array words = {"-n", "-np", "-ranks", "--n", "--np", "--ranks"};
+  return std::ranges::find(words, word.substr(0, word.find('='))) != words.end();
+}
+
 std::string unknown_argument(const std::string& word)
 {
-  const std::vector<std::string> names = argument_names();
-  return "unknown argument " + shortened(word) + "; did you mean " + nearest_word(word.substr(0, 40), names) + "?";
+  const std::string unknown = "unknown argument " + shortened(word);
+  if (asks_for_ranks(word))
+    return unknown + "; ranks are given before the program: RANKS=4 tools/run SCENE, or mpirun -n 4 squeal SCENE";
+  const std::string hint = spelling_hint(word.substr(0, 40), argument_names());
+  return unknown + (hint.empty() ? "; squeal -help lists the arguments" : hint);
 }
 
 /// An argument of squeal's own with two dashes, also where it was given with one, or in short.
@@ -133,7 +143,7 @@ Arguments take_arguments(int& argc, char** argv)
       known->take(arguments, argv[++i]);
     else if (known != known_arguments.end())
       arguments.problem = word + " needs a value: squeal -help lists the arguments";
-    else if (word.starts_with("--"))
+    else if (word.starts_with("--") || asks_for_ranks(word))
       arguments.problem = unknown_argument(word);
     else if (arguments.scene.empty() && word[0] != '-' && (word.ends_with(".toml") || is_scene_folder(word)))
       arguments.scene =

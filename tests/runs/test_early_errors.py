@@ -27,6 +27,9 @@ def refused(run, *words):
 TOAR = ["-modes_solver", "toar"]
 # what is given, and words of the message
 OPTIONS = {
+    "ranks among the arguments": (["--ranks", "4"], ["--ranks", "RANKS=4", "mpirun -n 4"]),
+    "ranks as the launcher takes them": (["-n", "4"], ["unknown argument -n", "mpirun -n 4"]),
+    "an argument near to none": (["--zzzzzzzzzzz"], ["--zzzzzzzzzzz; squeal -help lists"]),
     "no such word": (["-cycle_finish", "magic"], ["-cycle_finish", "multisecant"]),
     "zero": (["-response_tolerance", "0"], ["-response_tolerance", "above 0"]),
     "text for a number": (["-cycle_max_periods", "many"], ["-cycle_max_periods", "many"]),
