@@ -380,6 +380,21 @@ def test_axes_of_nodes_of_ansys(tmp_path):
     assert scene["force"] == [{"on": "node_4", "vector": pytest.approx([0, -3, 0], abs=1e-12)}]
 
 
+@pytest.mark.parametrize("option, table, expected", [
+    ("", "spring", {"from": "node_13", "to": "node_17", "direction": [0.5, 0.5, 1], "stiffness": 2e6, "damping": 3}),
+    ("KEYOPT,5,2,3\n", "spring", {"from": "node_13", "to": "node_17", "direction": "z", "stiffness": 2e6, "damping": 3}),
+    ("KEYOPT,5,3,2\n", None, "of another kind")])
+def test_springs_and_bands_of_ansys(tmp_path, option, table, expected):
+    """COMBIN14 along its line, or along an axis; one of planes is left out. MODOPT has the band."""
+    deck = cdb([*BRICK_ROWS, (9, 1, 5, 8, [13, 17])], option + "R,8,2.E6,3.\nMODOPT,QRDAMP,20,0,8000\n", [*AT, (0.5, 0.5, 3)])
+    scene, left_out = converted(tmp_path, deck.replace("ET,4,186\n", "ET,4,186\nET,5,14\n"), "deck.cdb")
+    assert scene["modes"] == {"band": 8000}
+    if table:
+        assert scene[table] == [expected] and left_out == []
+    else:
+        assert "spring" not in scene and expected in left_out[0]
+
+
 def test_pressures_damping_and_thickness_of_ansys(tmp_path):
     """SFE on a solid and on a SURF154 of its face, damping of all, layers of a shell, and what no scene has."""
     rows = [*BRICK_ROWS, (3, 1, 5, 1, [13, 14, 15, 16]), (4, 1, 6, 1, [1, 4, 3, 2])]

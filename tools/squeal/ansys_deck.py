@@ -38,6 +38,7 @@ class Deck:
         self.of_pair = {}  # faces and kind by the number of a real constant, with those of each Side
         self.sides = {}  # (real constant, Side) by the numbers of such elements
         self.reals, self.masses = {}, []  # values by real constant; (place, node, real constant, type) of MASS21
+        self.springs = []  # the same of COMBIN14, with two nodes
         self.options = {}  # of element types, by type and number of the option
         self.turning = []  # (name of a component, vector of its rate, place)
         self.frictions = {}
@@ -218,6 +219,8 @@ def add_element(deck, place, label, attributes, nodes):
         deck.bolts.setdefault(section, []).append((place, nodes))
     elif kind in SKINS:
         deck.skins[label] = face_of(nodes)
+    elif kind == 14:
+        deck.springs.append((place, nodes, real, kind_number))
     elif kind == 21:
         deck.masses.append((place, nodes[0], real, kind_number))
     else:
@@ -292,6 +295,8 @@ def material_data(words, place, deck):
         if values and values[0].upper().startswith("R"):
             values = values[2:]
         label, material, start, value = (*values, "", "", "", "")[:4]
+        if start not in ("", "1") or len(values) > 4 and any(values[4:]):
+            deck.left_out["MPDATA of further temperatures"] += 1
         if start not in ("", "1"):
             return
     deck.constants.setdefault(whole(material, place), {})[label.upper()] = number(value, place)
@@ -339,6 +344,7 @@ def finish(deck):
     ansys_loads.finish(deck)
     ansys_joining.pairs(deck, rotors)
     ansys_joining.masses(deck)
+    ansys_joining.springs(deck)
     model.notes += [f"{counted(count, 'element')} of {name}" for name, count in sorted(deck.other_elements.items())]
     if deck.left_out:
         model.notes.append("the commands " + ", ".join(f"{name} ({count})" for name, count in sorted(deck.left_out.items())))

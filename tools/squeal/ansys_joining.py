@@ -15,6 +15,7 @@ class Side(StrEnum):
 
 
 BONDED = (3, 5, 6)  # values of the option 12 of contact elements
+BEHAVIOURS = {1: "rough", 2: "without separation", 4: "without separation"}
 
 
 def rotors_of(deck):
@@ -52,6 +53,26 @@ def masses(deck):
             joints.inertia[node] = [*values[3:], 0.0, 0.0, 0.0]
 
 
+def springs(deck):
+    """COMBIN14: a stiffness and a damping along the line between its nodes, or by its option 2 along or about an axis."""
+    joints = deck.model.joints
+    for place, nodes, real, kind in deck.springs:
+        if real not in deck.reals:
+            raise undefined(place, "COMBIN14: the real constant", real, deck.reals)
+        a, b = (nodes + [0, 0])[:2]
+        values = (deck.reals[real] + [0.0] * 3)[:3]
+        motion, where = deck.options.get((kind, 2), 0), place.rpartition(", ")[2]
+        keys = {key: value for key, value in zip(("stiffness", "damping"), values) if value}
+        if not keys or motion not in range(7) or not b or deck.options.get((kind, 3), 0) in (1, 2) or deck.angles.keys() & {a, b}:
+            deck.note(f"COMBIN14 between the nodes {a} and {b}, of another kind than along its line or an axis", place)
+        elif motion < 4:
+            joints.springs.append((a, b, MOTIONS[motion - 1] if motion else None, keys, where))
+        else:
+            joints.connectors.append((a, b, {key: [value if i == motion - 1 else 0.0 for i in range(6)] for key, value in keys.items()}, where))
+        if values[2]:
+            deck.note(f"the quadratic damping of COMBIN14 at node {a}", place)
+
+
 def couple(deck, pair, pilot, surface):
     """A surface that follows a pilot node: as one rigid body, or in the mean where forces are distributed."""
     joints, where = deck.model.joints, f"pilot node {pilot}"
@@ -87,6 +108,8 @@ def pairs(deck, rotors):
         if deck.options.get((pair.get("type"), 12), 0) in BONDED and not any(name.startswith("FILL IN") for name in names):
             model.ties.append(tuple(names))
             continue
+        if behaviour := BEHAVIOURS.get(deck.options.get((pair.get("type"), 12), 0)):
+            model.notes.append(f"that the contact of real constant {real} is {behaviour}: it may open, and slides at its MU")
         keys = {"friction": deck.constants.get(pair["material"], {}).get("MU", 0.0)}
         for side, more in ((Side.TARGET, {}), (Side.CONTACT, {"slave": "rotor"})):
             keys |= {"rotation": rotors[real, side], **more} if (real, side) in rotors else {}

@@ -1,7 +1,7 @@
 """Supports, loads and damping of an Ansys deck. Nodes may have their motions along axes of their own."""
 
 import numpy as np
-from squeal.deck_files import Problem, number, span, whole
+from squeal.deck_files import number, span, whole
 from squeal.mesh_model import FLAT, MOTIONS, corners_of
 
 MOTION_OF = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "rx", "ROTY": "ry", "ROTZ": "rz"}
@@ -66,6 +66,11 @@ def gravity(words, place, deck):
         deck.model.gravity = [-v for v in values]  # an acceleration of the frame
 
 
+def band(words, place, deck):
+    """MODOPT,method,number,lowest,highest frequency."""
+    deck.model.band = number(words[4] if len(words) > 4 and words[4] else "0", place)
+
+
 def damping(words, place, deck):
     """ALPHAD, BETAD and DMPSTR of the whole model."""
     value = number(words[1] if len(words) > 1 and words[1] else "0", place)
@@ -81,7 +86,7 @@ def left_out_if_any(words, place, deck):
         deck.note(",".join(words[:4]), place)
 
 
-COMMANDS = {"D": support, "F": force, "ACEL": gravity, "ALPHAD": damping, "BETAD": damping, "DMPSTR": damping,
+COMMANDS = {"D": support, "F": force, "ACEL": gravity, "MODOPT": band, "ALPHAD": damping, "BETAD": damping, "DMPSTR": damping,
             **dict.fromkeys(("OMEGA", "DOMEGA", "CGOMEGA", "DCGOMG", "DMPRAT"), left_out_if_any)}
 
 # ---- what the whole deck makes
@@ -155,8 +160,6 @@ def pressures(deck):
         elif label in model.elements and model.elements[label][0] not in FLAT:
             index = FACES[model.elements[label][0][:3]].get(side)
             face = None if index is None else model.faces(label)[index]
-        elif label not in model.elements:
-            raise Problem(f"{place}: SFE of element {label}, which the deck does not define")
         if face is None:
             deck.note(f"the pressure on face {side} of element {label}, which is none of a solid", place)
         else:

@@ -89,6 +89,8 @@ class Model:
             before = self.places[number]
             before = before if isinstance(before, str) else before.place_of(number)
             raise Problem(f"{place}: element {number} is there twice, first in {before}; give it another number")
+        if not 0 < number < 2**31:
+            raise Problem(f"{place}: element {number}: expected a number from 1 to {2**31 - 1}")
         missing = [node for node in nodes if node not in self.nodes]
         if missing:
             raise Problem(f"{place}: element {number} has node {missing[0]}, which the deck does not define")
@@ -116,7 +118,7 @@ class Model:
         """Rows of a number and its nodes at once; False, and nothing is added, where one of them is wrong."""
         numbers = table[:, 0].tolist()
         labels = np.fromiter(self.nodes, np.int64, len(self.nodes))
-        if len(set(numbers)) < len(numbers) or not self.elements.keys().isdisjoint(numbers):
+        if not 0 < table[:, 0].min() <= table[:, 0].max() < 2**31 or len(set(numbers)) < len(numbers) or not self.elements.keys().isdisjoint(numbers):
             return False
         if not np.isin(table[:, 1:], labels).all():
             return False
