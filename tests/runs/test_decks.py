@@ -478,6 +478,19 @@ def test_loss_factors_ask_for_no_frequency(tmp_path, squeal):
     assert scene["damping"]["loss_frequency"] == pytest.approx(2000) and "estimate" not in scene and left_out == []
 
 
+def test_mid_side_nodes_of_ansys_are_all_or_none(tmp_path):
+    """Tetrahedra of SOLID187 without mid-side nodes are linear, as CDWRITE has them; some without others are refused."""
+    at = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (.5, 0, 0), (.5, .5, 0), (0, .5, 0), (0, 0, .5), (.5, 0, .5), (0, .5, .5)]
+
+    def kind(nodes):
+        (tmp_path / "deck.cdb").write_text(cdb([(1, 1, 4, 1, nodes)], "", at).replace("ET,4,186", "ET,4,187"))
+        return TOOL.read_deck(tmp_path / "deck.cdb").elements[1][0]
+
+    assert [kind([1, 2, 3, 4]), kind([*range(1, 11)]), kind([1, 2, 3, 4, *[0] * 6])] == ["tet4", "tet10", "tet4"]
+    with pytest.raises(TOOL.Problem, match="line .*all mid-side nodes or none"):
+        kind([1, 2, 3, 4, 5, 0, 7, 8, 9, 10])
+
+
 def test_degenerate_bricks_of_ansys(tmp_path):
     """Bricks that repeat corners are wedges and tetrahedra."""
     rows = [(1, 1, 1, 1, [1, 2, 3, 3, 5, 6, 7, 7]), (2, 1, 1, 1, [9, 10, 11, 11, 13, 13, 13, 13])]

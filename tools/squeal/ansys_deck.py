@@ -174,23 +174,23 @@ def read_elements(words, lines, deck):
 
 def kind_of(kind, nodes, place):
     """The kind of a solid, and its nodes without those that a degenerate form repeats."""
-    if kind in (92, 187):
-        return "tet10", nodes[:10]
-    if kind == 285:
-        return "tet4", nodes[:4]
-    corners = nodes[:8]
-    if len(nodes) < 8:
-        raise Problem(f"{place}: {len(nodes)} nodes of element type {kind}; expected 8 or 20")
+    few, most = (4, 10) if SOLIDS[kind] in (4, 10) else (8, 20)
+    corners, mids = nodes[:few], nodes[few:most]
+    if len(corners) < few or any(mids) and not (all(mids) and len(mids) == most - few):
+        raise Problem(f"{place}: an element of type {kind} lacks some of its {few} corners or {most - few} mid-side nodes; expected "
+                      "all corners, and all mid-side nodes or none")
+    quadratic = any(mids) and kind != 285
+    if few == 4:
+        return ("tet10", corners + mids) if quadratic else ("tet4", corners)
     different = len(set(corners))
-    mids = nodes[8:20]
     if different == 8:
-        return ("hex20", nodes[:20]) if len(mids) == 12 and all(mids) else ("hex8", corners)
+        return ("hex20", corners + mids) if quadratic else ("hex8", corners)
     if different == 6 and corners[2] == corners[3] and corners[6] == corners[7]:
-        if mids and all(mids):
+        if quadratic:
             raise Problem(f"{place}: a wedge of 15 nodes, which has no element in squeal: expected linear wedges or tetrahedra")
         return "wedge6", [corners[i] for i in WEDGE_OF]
     if different == 4 and len(set(corners[4:])) == 1 and corners[2] == corners[3]:
-        if len(mids) == 12 and all(mids):  # edges IJ, JK, KI, IM, JM, KM
+        if quadratic:  # edges IJ, JK, KI, IM, JM, KM
             return "tet10", [corners[i] for i in TET_OF] + [mids[i] for i in (0, 1, 3, 8, 9, 10)]
         return "tet4", [corners[i] for i in TET_OF]
     raise Problem(f"{place}: an element of {different} corners, which has no element in squeal: expected tetrahedra, wedges "
@@ -275,7 +275,8 @@ def read_reals(words, lines, deck):
         deck.reals[whole(fields[0], place)] = values
 
 
-BLOCKS = {"RLBLOCK": read_reals, "SECBLOCK": ansys_equations.section_block, "SFE": ansys_loads.surface_load, "NBLOCK": read_nodes, "EBLOCK": read_elements, "CMBLOCK": read_component}
+BLOCKS = {"RLBLOCK": read_reals, "SECBLOCK": ansys_equations.section_block, "SFE": ansys_loads.surface_load,
+          "NBLOCK": read_nodes, "EBLOCK": read_elements, "CMBLOCK": read_component}
 
 # ---- commands
 
@@ -319,7 +320,7 @@ def rotation(words, place, deck):
         deck.turning.append((words[1] if len(words) > 1 else "", rate, place))
 
 
-COMMANDS = {"R": real_constants, "CMROTATE": rotation, "KEYOPT": key_option, "ET": element_type, "MPDATA": material_data, "MP": material_data,
+COMMANDS = {"R": real_constants, "CMROTATE": rotation, "KEYOPT": key_option, "KEYOP": key_option, "ET": element_type, "MPDATA": material_data, "MP": material_data,
             "N": node, "CE": ansys_equations.read_equation, "SECTYPE": ansys_equations.section_type, "SECDATA": ansys_equations.section_data,
             "SLOAD": ansys_equations.section_load, **ansys_loads.COMMANDS}
 
