@@ -11,8 +11,8 @@ namespace squeal
 Finally one_thread();
 
 /// work() on rank 0, on matrices of `rows` rows. From 500 rows on its BLAS has a thread for each rank of its node, as
-/// far as rank 0 may use their cores, and the others sleep until it has ended. Nothing changes with BLAS libraries
-/// other than OpenBLAS. Collective. Error on every rank: what it throws.
+/// far as rank 0 may use their cores. The others sleep until it has ended. Nothing changes with BLAS libraries other
+/// than OpenBLAS. Collective. Error on every rank: what it throws.
 void on_rank_zero_with_lent_cores(MPI_Comm comm, std::size_t rows, const std::function<void()>& work);
 
 } // namespace squeal

@@ -1,6 +1,6 @@
 #pragma once
-/// The eigenvalues theta of K y = theta M y, symmetric or not, nearest a real shift, by a block Krylov space of (K -
-/// shift M)^-1 M (src/README.md, section 8.7).
+/// The eigenvalues theta of K y = theta M y nearest a real shift, symmetric or not. A block Krylov space of (K - shift
+/// M)^-1 M finds them (src/README.md, section 8.7).
 ///
 /// Blocks are used for two reasons. Brakes have many nearly equal modes (doublets of a disc, one mode for each pin). A
 /// space grown from a single vector finds these late or never. MUMPS reads its factor once for a block. There are no

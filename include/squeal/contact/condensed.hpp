@@ -1,6 +1,6 @@
 #pragma once
-/// The factor of a matrix A bordered by the rows B of the pairs, from which the condensed contact operator W = scale B
-/// A^-1 B' comes (src/README.md, sections 4.4 and 8.4).
+/// The factor of a matrix A bordered by the rows B of the pairs. The condensed contact operator W = scale B A^-1 B'
+/// comes from it (src/README.md, sections 4.4 and 8.4).
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/contact/interface.hpp"
 

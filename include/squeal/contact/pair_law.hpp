@@ -13,7 +13,7 @@
 /// unique while |mu'| r_n A_tt < 1. In a step w_t is s_theta/theta: `law_of_step` takes mu at s_theta.
 ///
 /// In a direction in which neither side can move (a zero row of W), r_t opposes the drive while the pair slides along
-/// it, although it moves nothing. At rest there, r_t is zero along it.
+/// it. It moves nothing there. At rest there, r_t is zero along it.
 #include "squeal/contact/pair_friction.hpp"
 #include "squeal/contact/pairs.hpp"
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Contact pairs of two surfaces whose meshes need not match (src/README.md, section 1.9), and the distribution of
-/// nodes and elements over the ranks, which keeps pairs together.
+/// Contact pairs of two surfaces whose meshes need not match (src/README.md, section 1.9). The distribution of nodes
+/// and elements over the ranks keeps pairs together.
 #include "squeal/mesh/mesh.hpp"
 
 namespace squeal

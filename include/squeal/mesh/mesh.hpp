@@ -58,7 +58,8 @@ struct SuperelementRow
 };
 
 /// Nodes, elements and named sets of them. Nodes of the file come first, then the scene's points, then the reference
-/// points of rigid bodies and couplings, nodes within beams, then what carries modal coordinates of superelements.
+/// points of rigid bodies and couplings. Nodes within beams follow, and what carries modal coordinates of
+/// superelements.
 struct Mesh
 {
   std::vector<Vec3> nodes;                                 // [m]

@@ -1,6 +1,6 @@
 #pragma once
 /// Ties of surfaces whose meshes need not match: the bilateral form of the pairs' rows (src/README.md, section 1.9).
-/// The row of slave node i,  sum of slave weights u = sum of c_ij u_j,  is solved for u_i, so that a tie is an exact
+/// The row of slave node i,  sum of slave weights u = sum of c_ij u_j,  is solved for u_i. A tie is then an exact
 /// constraint. A mid-side of a solid on an edge that a shell shares follows the edge's ends, between which the shell is
 /// linear.
 #include "squeal/mesh/contact_pairs.hpp"

@@ -313,9 +313,9 @@ Scene read_scene(const std::filesystem::path& file, const std::vector<std::strin
 /// contact that has a drive of its own too, and for a rotor that drives nothing.
 void drive_contacts(Scene& scene, std::span<const int> rotors);
 
-/// A sentence for each material that no solid has and each mass that none has, which a slip of units explains, and for
-/// each load that does nothing or turns round, or setting that nothing uses. Of gaps and compliances beside the model's
-/// length [m], and of its mass [kg], unless that is 0.
+/// A sentence for each material that no solid has and each mass that none has, which a slip of units explains. So for
+/// each load that does nothing or turns round, and each setting that nothing uses. Of gaps and compliances beside the
+/// model's length [m], and of its mass [kg], unless that is 0.
 std::vector<std::string> doubts_about(const Scene& scene, double length, double mass);
 
 /// Returns the scene as TOML with all defaults; read_scene of it gives the same scene.

@@ -37,9 +37,8 @@ struct EnergyShare
   double kinetic = 0, strain = 0;
 };
 
-/// Powers are over the mean energy (|lambda|^2 phi^H M phi + phi^H K phi)/4 of the motion [1/s], K with the springs of
-/// pairs that have a compliance. Those of contacts are put in, and sums over the scene's contacts; a matrix scene has
-/// one.
+/// Powers are over the mean energy (|lambda|^2 phi^H M phi + phi^H K phi)/4 of the motion [1/s]. K has the springs of
+/// pairs with a compliance. Those of contacts are put in, and sums over the scene's contacts; a matrix scene has one.
 struct ModeCauses
 {
   std::complex<double> lambda;
