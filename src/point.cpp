@@ -125,7 +125,7 @@ std::string cause_of_none(const Model& model, const Outcome& outcome, const Equi
 
 SlidingPoint find_sliding(const Model& model, const ProgramOptions& options, const StageRunner& run)
 {
-  SlidingPoint point{&model, {}, {}, {}, {}};
+  SlidingPoint point{&model, {}, {}, {}, {}, {}};
   point.equilibrium =
       run_stage(run, Stage::equilibrium, "",
                 [&] { return find_equilibrium(model.structure, model.interface, options.equilibrium); });

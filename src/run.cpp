@@ -3,6 +3,7 @@
 #include "squeal/base/free_memory.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/forecast.hpp"
+#include "squeal/mesh_error.hpp"
 #include "squeal/scene/numbers.hpp"
 #include "squeal/studies.hpp"
 
@@ -166,6 +167,8 @@ ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results,
   }
   save();
   report.point = with_small_motions(std::move(report.point), scene, options, runner);
+  if (options.mesh_error == MeshErrorMethod::refinement)
+    runner(Stage::modes, [&] { return report.point.mesh_error = find_mesh_error(point, scene, options), false; });
   save();
   stage(Stage::response, report.response, [&] { return run_response(point, scene, options); });
   stage(Stage::transient, report.transient, [&] { return find_transient(point, scene, options); });

@@ -41,7 +41,7 @@ Mesh read_file(const Scene& scene)
   FileMesh file = read_mesh_file(*scene.mesh);
   try
   {
-    for (int i = 0; i < scene.mesh->refine; ++i) refine(file);
+    refine(file, scene.mesh->refine);
     return build_mesh(file, scene);
   }
   catch (const Error& error)

@@ -15,6 +15,7 @@
 #include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <map>
@@ -220,22 +221,26 @@ void divide(ElementBlock& block, const CellType& type, NewNodes& numbers, const 
 
 } // namespace
 
-void refine(FileMesh& mesh)
+void refine(FileMesh& mesh, int times)
 {
-  constexpr double finer = 8;                        // nodes and elements for each one
   constexpr double bytes_a_node = 3 * (3 * 81) * 12; // M, C and K of bricks, on all ranks together
+  const double finer = std::pow(8, times);           // nodes and elements for each one
   std::size_t entries = 6 * mesh.nodes.size();       // degrees of freedom
   for (const ElementBlock& block : mesh.blocks) entries = std::max(entries, block.nodes.size());
   const double nodes = finer * static_cast<double>(mesh.nodes.size()), free = free_memory(MPI_COMM_SELF);
-  if (finer * static_cast<double>(entries) > std::numeric_limits<int>::max() || nodes * bytes_a_node > free)
+  if (times > 0 &&
+      (finer * static_cast<double>(entries) > std::numeric_limits<int>::max() || nodes * bytes_a_node > free))
     throw Error(
-        format("mesh.refine would divide %zu nodes into about %.2g, whose matrices take %.2g GB where %.2g GB are "
-               "free: give a smaller one",
-               mesh.nodes.size(), nodes, 1e-9 * nodes * bytes_a_node, 1e-9 * free));
-  mesh.parents.clear();
-  NewNodes numbers(mesh);
-  for (ElementBlock& block : mesh.blocks)
-    if (const auto type = cell_type(block.type)) divide(block, *type, numbers, mesh.nodes);
+        format("mesh.refine = %d would divide %zu nodes into about %.2g, whose matrices take %.2g GB where %.2g "
+               "GB are free: give a smaller one",
+               times, mesh.nodes.size(), nodes, 1e-9 * nodes * bytes_a_node, 1e-9 * free));
+  for (int i = 0; i < times; ++i)
+  {
+    mesh.parents.clear();
+    NewNodes numbers(mesh);
+    for (ElementBlock& block : mesh.blocks)
+      if (const auto type = cell_type(block.type)) divide(block, *type, numbers, mesh.nodes);
+  }
 }
 
 } // namespace squeal

@@ -275,7 +275,20 @@ std::string next_command(const Report& report, const Scene& scene)
   return options.empty() ? report.program + " report " + report.place.string() : report.command + options;
 }
 
-std::string heard(const Report& report, const Scene& scene)
+namespace
+{
+
+/// Modes whose growth the mesh leaves open; empty: none that it was asked about.
+std::string undecided_by_mesh(const Report& report)
+{
+  const auto& modes = report.point.mesh_error.modes;
+  const auto open = std::ranges::find_if(modes, &ModeOnFinerMesh::is_undecided);
+  if (open == modes.end()) return {};
+  return format("; whether the mode at %.5g Hz grows is undecided by the mesh (growth rate %.3g +- %.2g 1/s)",
+                frequency_hz_of(open->lambda), open->corrected().real(), open->growth_bar());
+}
+
+std::string what_is_heard(const Report& report, const Scene& scene)
 {
   if (has_run(report.motion.settled.outcome)) return settled_text(report, scene);
   const Outcome& outcome = report.motion.cycle.outcome;
@@ -291,6 +304,13 @@ std::string heard(const Report& report, const Scene& scene)
                               ? "the search for a cycle ended with " + std::string(word(outcome.kind))
                               : "the run was ended " + report.ended_by;
   return linear_text(report) + "; what is heard was not found: " + end;
+}
+
+} // namespace
+
+std::string heard(const Report& report, const Scene& scene)
+{
+  return what_is_heard(report, scene) + undecided_by_mesh(report);
 }
 
 } // namespace squeal

@@ -64,6 +64,34 @@ const char* count_remedy(const Modes& modes)
          "overdamped, and -modes_solver slices and toar seek them in different ways";
 }
 
+void add_mode_error(Entry out, const ModeOnFinerMesh& mode)
+{
+  out.show("frequency_hz", "Hz", "frequency of the mode on the scene's mesh", frequency_hz_of(mode.lambda));
+  out.show("growth_rate", "1/s", "its growth rate there", mode.lambda.real());
+  out.show("finer_frequency_hz", "Hz", "the frequency with every element divided", frequency_hz_of(mode.finer));
+  out.show("finer_growth_rate", "1/s", "the growth rate there", mode.finer.real());
+  out.brief("corrected_frequency_hz", "Hz", "the frequency where both meshes lead", frequency_hz_of(mode.corrected()));
+  out.error("frequency_error", "its bar, for orders of convergence from 1 on", mode.frequency_bar()).is_brief = true;
+  out.brief("corrected_growth_rate", "1/s", "the growth rate where both meshes lead", mode.corrected().real());
+  out.error("growth_error", "its bar", mode.growth_bar()).is_brief = true;
+  out.show("undecided", "switch", "the bar holds zero growth, or growth of the other sign", mode.is_undecided());
+  out.add("backward_error", "-", "backward error on the finer mesh", mode.backward_error);
+}
+
+void add_mesh_error(Entry whole, const MeshError& error)
+{
+  if (!whole.has(error.outcome.kind != OutcomeKind::off)) return;
+  const Entry out = whole.group("mesh_error");
+  out.add("outcome", "whether the modes were found on the finer mesh", error.outcome.kind);
+  out.text("reason", "why not", error.outcome.reason);
+  out.add("dofs", "-", "degrees of freedom of the finer mesh", error.dofs);
+  std::vector<ModeOnFinerMesh> known;
+  std::ranges::copy_if(error.modes, std::back_inserter(known), &ModeOnFinerMesh::is_known);
+  out.list("modes", add_mode_error, known);
+  if (!error.outcome.reason.empty())
+    whole.warn(Severity::note, format("no error of the mesh: %s", error.outcome.reason.c_str()));
+}
+
 void warn_of_modes(Entry out, const Modes& modes, const ModelSummary& model)
 {
   if (modes.modes.empty() && modes.outcome.kind == OutcomeKind::converged)
@@ -179,6 +207,7 @@ void add_modes(Entry out, const Report& report)
   if (out.has(dependent > 0))
     out.show("dependent_rows", "-", "rows of pairs that stick which the other rows imply", dependent);
   out.list("modes", add_mode, modes.modes);
+  add_mesh_error(out, report.point.mesh_error);
   if (out.has(!modes.projected.empty())) out.list("projected", add_mode, modes.projected); // of the other route
   warn_of_modes(out, modes, report.model);
 }

@@ -94,7 +94,7 @@ TEST_CASE("children fill their parent, curved as it is")
     FileMesh file = single(reference);
     const bool shell = is_shell(reference.shape);
     const auto whole = moments(mesh_of(file, shell));
-    refine(file);
+    refine(file, 1);
     const Mesh divided = mesh_of(file, shell);
     CHECK(divided.elements.size() == (shell ? 4 : 8));
     const auto parts = moments(divided);
@@ -102,7 +102,7 @@ TEST_CASE("children fill their parent, curved as it is")
     const double inexact = mid_sides(reference.shape).empty() ? 1e-14 : 2e-4;
     CHECK(parts[0] == doctest::Approx(whole[0]).epsilon(inexact));
     if (!mid_sides(reference.shape).empty()) continue;
-    refine(file);
+    refine(file, 1);
     const auto again = moments(mesh_of(file, shell));
     CHECK(again[0] == doctest::Approx(parts[0]).epsilon(1e-14));
     CHECK(again[1] == doctest::Approx(parts[1]).epsilon(0.02)); // by the rule of the mass, on smaller elements
@@ -116,7 +116,7 @@ TEST_CASE("the parents of a new node give its place by weights that add up to on
     CAPTURE(reference.gmsh_type);
     FileMesh file = single(reference);
     const std::size_t before = file.nodes.size();
-    refine(file);
+    refine(file, 1);
     const Mesh mesh = mesh_of(file, is_shell(reference.shape));
     REQUIRE(mesh.parents.size() + before == mesh.nodes.size());
     for (std::size_t i = 0; i < mesh.parents.size(); ++i)

@@ -1,0 +1,19 @@
+#pragma once
+/// What the mesh leaves open on growth rates and frequencies: modes of the scene's mesh and of one with every element
+/// divided (mesh.refine), and where both lead.
+///
+/// An eigenvalue goes as lambda(h) = lambda + c h^q. With d = lambda(h/2) - lambda(h) the limit is lambda(h/2) + d/(2^q
+/// - 1). The order q is not known: at corners and edges of contact it is below that of the elements, 2 or 4. Orders
+/// from 1 on put the limit between lambda(h/2) and lambda(h/2) + d; the middle is the corrected value, half of |d| its
+/// bar. Caveat: a mesh that is too coarse has no order yet. The geometry's own curvature is not found again.
+#include "squeal/options.hpp"
+#include "squeal/transient/sliding_point.hpp"
+
+namespace squeal
+{
+
+/// The modes on the finer mesh that follow from the unstable ones and from the stable one nearest to growing.
+/// Collective. outcome: "converged"; "not converged": no equilibrium there, or a mode was not found on it; "skipped".
+MeshError find_mesh_error(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options);
+
+} // namespace squeal

@@ -1,0 +1,62 @@
+"""What the mesh leaves open on modes: a model with every element divided, and where both meshes lead."""
+
+import math
+
+import pytest
+from conftest import INPUTS
+
+BAR = """
+n = %d;
+Point(1) = {0, 0, 0}; Point(2) = {0, 0.2, 0}; Point(3) = {0, 0.2, 0.2}; Point(4) = {0, 0, 0.2};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1};
+Transfinite Curve{1, 2, 3, 4} = 2;
+Curve Loop(1) = {1, 2, 3, 4}; Plane Surface(1) = {1}; Transfinite Surface{1}; %s
+out[] = Extrude {1, 0, 0} { Surface{1}; Layers{n}; %s };
+Physical Volume("bar") = {out[1]}; Physical Surface("end") = {1};
+Physical Surface("y") = {out[3], out[5]}; Physical Surface("z") = {out[2], out[4]};
+%s
+"""
+
+SCENE = """
+mesh = { file = "bar.geo" }
+part = [ { name = "bar", young = 1e9, poisson = 0, density = 1000 } ]
+support = [ { on = "end", fixed = "x" }, { on = "y", fixed = "y" }, { on = "z", fixed = "z" } ]
+damping = { beta = 1e-6 }
+modes = { band = 400 }
+"""
+
+SECOND_ORDER = "Mesh.ElementOrder = 2; Mesh.SecondOrderIncomplete = 1;"
+ELEMENTS = {"hex8": ("Recombine Surface{1};", "Recombine;", ""), "hex20": ("Recombine Surface{1};", "Recombine;", SECOND_ORDER),
+            "wedge6": ("", "Recombine;", ""), "tet4": ("", "", ""), "tet10": ("", "", SECOND_ORDER)}
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_the_error_of_a_clamped_bar_is_known(squeal, tmp_path, element):
+    """Exactly sqrt(E/rho)/4 L = 250 Hz and growth -beta omega^2/2. On three meshes of each element the change that is
+    expected of the first mode is between half and twice the true error, and the bar holds the exact values."""
+    first, extrusion, order = ELEMENTS[element]
+    (tmp_path / "scene.toml").write_text(SCENE)
+    for n in (1, 2, 4):
+        (tmp_path / "bar.geo").write_text(BAR % (n, first, extrusion, order))
+        report = squeal(tmp_path / "scene.toml", "-modes_mesh_error", "refinement", ranks=1).report
+        mode, = report["modes"]["mesh_error"]["modes"]
+        for name, error, exact in (("frequency_hz", "frequency_error", 250),
+                                   ("growth_rate", "growth_error", -1e-6 / 2 * (2 * math.pi * 250)**2)):
+            expected = abs(mode["corrected_" + name] - mode[name])
+            assert 0.5 < expected / abs(exact - mode[name]) < 2
+            assert abs(mode["corrected_" + name] - exact) <= mode[error]
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_the_finer_modes_are_those_of_the_finer_mesh(squeal, tmp_path, ranks):
+    """Those that a run on mesh.refine = 1 finds, to 1e-6: growth rates are off by 1e4 times a backward error of 1e-12. On a
+    coarse mesh the growth rate of the pin is far from what both meshes lead to."""
+    scene = INPUTS / "pin_on_disc" / "scene.toml"
+    options = ("--set", "cycle.enabled=false", "--set", "estimate.enabled=false", "--set", "modes.band=6000")
+    found = squeal(scene, *options, "-modes_mesh_error", "refinement", ranks=ranks).report["modes"]
+    if ranks == 1:
+        finer = squeal(scene, *options, "--set", "mesh.refine=1", ranks=1).report["modes"]["modes"]
+        assert found["mesh_error"]["modes"][0]["finer_growth_rate"] == pytest.approx(finer[0]["growth_rate"], rel=1e-6)
+        assert found["mesh_error"]["modes"][0]["finer_frequency_hz"] == pytest.approx(finer[0]["frequency_hz"], rel=1e-8)
+    assert found["mesh_error"]["modes"][0]["finer_growth_rate"] == pytest.approx(139.461274, rel=1e-6)
+    assert found["mesh_error"]["modes"][0]["undecided"] is False
