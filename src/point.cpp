@@ -231,8 +231,10 @@ std::string why_off(Stage which, const SlidingPoint& point, const Scene& scene)
 
 Trajectory find_transient(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options)
 {
-  const TransientSettings& settings = scene.transient;
+  TransientSettings settings = scene.transient;
   const std::string reason = no_mode_to_follow(point, scene);
+  if (!reason.empty() && !scene.initial.empty() && settings.steps > 0 && !starts_without_a_mode(settings))
+    settings.start.kind = StartKind::equilibrium; // [[initial]] alone moves it then
   if (point.equilibrium.outcome.kind != OutcomeKind::converged || (!reason.empty() && !starts_without_a_mode(settings)))
     return not_run<Trajectory>(OutcomeKind::skipped, reason);
   const ComplexMode* followed = reason.empty() ? &point.modes.modes.front() : nullptr;

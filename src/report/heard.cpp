@@ -272,7 +272,15 @@ std::string next_command(const Report& report, const Scene& scene)
   if (!report.ended_by.empty())
     return report.command + (report.command.find(" --restart") == std::string::npos ? " --restart" : "");
   const std::string options = options_to_go_on(report, scene);
-  return options.empty() ? report.program + " report " + report.place.string() : report.command + options;
+  if (options.empty()) return report.program + " report " + report.place.string();
+  std::string command = report.command; // without the keys that the options set anew
+  for (std::size_t at = options.find(" --set "); at != std::string::npos; at = options.find(" --set ", at + 1))
+  {
+    const std::string key = options.substr(at, options.find('=', at) + 1 - at);
+    for (std::size_t old = 0; (old = command.find(key)) != std::string::npos;)
+      command.erase(old, command.find(' ', old + key.size()) - old);
+  }
+  return command + options;
 }
 
 namespace
