@@ -16,8 +16,8 @@ namespace squeal
 /// the .geo does not define, and in a build without libgmsh.
 FileMesh read_mesh_file(const MeshSource& source);
 
-/// Divides every element so many times: lines in 2, faces in 4, solids in 8, by their shape functions. New nodes follow those
-/// that are there. Elements that squeal has no shape for stay. Throws Error for more than memory holds.
+/// Divides every element so many times: lines in 2, faces in 4, solids in 8, by their shape functions. New nodes follow
+/// those that are there. Elements that squeal has no shape for stay. Throws Error for more than memory holds.
 void refine(FileMesh& mesh, int times);
 
 /// Returns the parts, surfaces and groups of a file under the names that the scene gives. Throws Error as read_mesh.
