@@ -111,8 +111,8 @@ std::string shell_word(const std::string& word)
 
 std::string command_of(int argc, char** argv)
 {
-  std::string text;
-  for (int i = 0; i < argc; ++i) text += (i > 0 ? " " : "") + shell_word(argv[i]);
+  std::string text = shell_word(argv[0]);
+  for (int i = 1; i < argc; ++i) text.append(" ").append(shell_word(argv[i]));
   return text;
 }
 
