@@ -46,10 +46,6 @@ OptionList options_of(ProgramOptions& options)
        "solver of larger problems: slices of frequency, or SLEPc's TOAR around zero (toar)"},
       {"-modes_shapes", choice_of(options.modes.shapes), Range::any,
        "modes whose shapes fields.h5 holds: the unstable ones, or all"},
-      {"-modes_mesh_error", choice_of(options.mesh_error), Range::any,
-       "what the mesh leaves open on the unstable modes and the next one: off, or by a model with every element "
-       "divided "
-       "(refinement), which takes eight times the memory and more"},
       {"-transient_refuse", &options.step.refuse, Range::any,
        "false: march even where theta and the step falsify growth rates"},
       {"-transient_contact_solver", choice_of(contact.solver), Range::any,

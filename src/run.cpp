@@ -167,7 +167,7 @@ ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results,
   }
   save();
   report.point = with_small_motions(std::move(report.point), scene, options, runner);
-  if (options.mesh_error == MeshErrorMethod::refinement)
+  if (scene.modes.mesh_error == MeshErrorMethod::refinement)
     runner(Stage::modes, [&] { return report.point.mesh_error = find_mesh_error(point, scene, options), false; });
   save();
   stage(Stage::response, report.response, [&] { return run_response(point, scene, options); });

@@ -12,15 +12,6 @@
 namespace squeal
 {
 
-/// How the error that the mesh leaves on modes is estimated.
-enum class MeshErrorMethod
-{
-  off,
-  refinement, // by a model with every element divided
-};
-
-template <> inline constexpr std::array words_of<MeshErrorMethod> = {"off", "refinement"};
-
 /// The options of all stages.
 struct ProgramOptions
 {
@@ -35,7 +26,6 @@ struct ProgramOptions
   TableLength length{};             // --verbose: full
   std::string program{}, command{}; // by which the program was called
   ResponseOptions response;
-  MeshErrorMethod mesh_error{}; // of the modes
 };
 
 OptionList options_of(ProgramOptions& options);

@@ -22,6 +22,10 @@ SceneKeys keys_of(ModesSettings& m)
       {"real_modes", &m.real_modes, "-", "number of real modes of the projection; 0: those of the band", not_negative},
       {"residual_passes", &m.residual_passes, "-", "corrections of the projection by the residual", not_negative},
       {"band", &m.band, "Hz", "every mode below is reported", positive},
+      {"mesh_error", choice_of(m.mesh_error), "word",
+       "what the mesh leaves open on the unstable modes and the next one: off, or by a model with every element "
+       "divided "
+       "(refinement), which takes eight times the memory and more"},
   };
 }
 

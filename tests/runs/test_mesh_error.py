@@ -38,7 +38,7 @@ def test_the_error_of_a_clamped_bar_is_known(squeal, tmp_path, element):
     (tmp_path / "scene.toml").write_text(SCENE)
     for n in (1, 2, 4):
         (tmp_path / "bar.geo").write_text(BAR % (n, first, extrusion, order))
-        report = squeal(tmp_path / "scene.toml", "-modes_mesh_error", "refinement", ranks=1).report
+        report = squeal(tmp_path / "scene.toml", "--set", "modes.mesh_error=refinement", ranks=1).report
         mode, = report["modes"]["mesh_error"]["modes"]
         for name, error, exact in (("frequency_hz", "frequency_error", 250),
                                    ("growth_rate", "growth_error", -1e-6 / 2 * (2 * math.pi * 250)**2)):
@@ -53,7 +53,7 @@ def test_the_finer_modes_are_those_of_the_finer_mesh(squeal, tmp_path, ranks):
     coarse mesh the growth rate of the pin is far from what both meshes lead to."""
     scene = INPUTS / "pin_on_disc" / "scene.toml"
     options = ("--set", "cycle.enabled=false", "--set", "estimate.enabled=false", "--set", "modes.band=6000")
-    found = squeal(scene, *options, "-modes_mesh_error", "refinement", ranks=ranks).report["modes"]
+    found = squeal(scene, *options, "--set", "modes.mesh_error=refinement", ranks=ranks).report["modes"]
     if ranks == 1:
         finer = squeal(scene, *options, "--set", "mesh.refine=1", ranks=1).report["modes"]["modes"]
         assert found["mesh_error"]["modes"][0]["finer_growth_rate"] == pytest.approx(finer[0]["growth_rate"], rel=1e-6)

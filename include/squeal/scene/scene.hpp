@@ -86,6 +86,15 @@ struct CycleStart
   std::filesystem::path file; // of CycleStartKind::file; absolute
 };
 
+/// How the error that the mesh leaves on modes is estimated.
+enum class MeshErrorMethod
+{
+  off,
+  refinement, // by a model with every element divided
+};
+
+template <> inline constexpr std::array words_of<MeshErrorMethod> = {"off", "refinement"};
+
 /// Settings of a stage. A stage runs if it is enabled, or if a later enabled stage needs it.
 struct ModesSettings
 {
@@ -94,6 +103,7 @@ struct ModesSettings
   int real_modes = 0;      // [-] number of real modes of the projection; 0: those below the band
   int residual_passes = 3; // [-] number of corrections of the projection
   double band = 20000;     // [Hz] modes below this frequency are reported
+  MeshErrorMethod mesh_error = MeshErrorMethod::off;
 };
 
 /// Settings of the energy estimate.
