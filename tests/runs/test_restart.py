@@ -99,8 +99,9 @@ def assert_close(one, other, rel):
 OF_THE_WORK = {"energy_defect_max", "contact_iterations_mean", "residual", "iterations"}  # of contact, whose memory starts anew
 
 
-def assert_same_answer(one, other):
-    """To solver tolerance; what no restart goes on with to the last bit."""
+def assert_same_answer(one, other, of_cycle=1e-6):
+    """To solver tolerance; what no restart goes on with to the last bit. Finer steps are sought until the accuracy is met, which
+    is then the tolerance of the cycle."""
     reports = [numbers(json.loads((folder / "report.json").read_text())) for folder in (one, other)]
     for stage in ("equilibrium", "modes", "estimate"):
         assert reports[0][stage] == reports[1][stage]
@@ -117,8 +118,8 @@ def assert_same_answer(one, other):
     first, second = (report["cycle"] for report in reports)
     verdicts = [cycle.get("multipliers", {}).get("stability") for cycle in (first, second)]  # none: it was not asked for
     assert first["outcome"] == second["outcome"] and verdicts[0] == verdicts[1]
-    assert second["frequency_hz"] == pytest.approx(first["frequency_hz"], rel=1e-6)
-    assert second["mean_fluctuating_energy"] == pytest.approx(first["mean_fluctuating_energy"], rel=1e-4)
+    assert second["frequency_hz"] == pytest.approx(first["frequency_hz"], rel=of_cycle)
+    assert second["mean_fluctuating_energy"] == pytest.approx(first["mean_fluctuating_energy"], rel=max(1e-4, of_cycle))
 
 
 @pytest.mark.parametrize("ranks, scene", [(1, PIN), (2, FOUR_PAIRS[:-2]), (3, FOUR_PAIRS)], ids=["1", "2", "3"])
@@ -295,7 +296,10 @@ def test_each_stage_goes_on(tmp_path, stage):
         again = start(output, *arguments, "--restart", scene=scene)
         printed, errors = again.communicate()
         assert again.returncode == 0 and "of the checkpoint" in printed, errors + printed
-    (assert_same_results if stage == "settled" else assert_same_answer)(straight, output)
+    if stage == "settled":
+        assert_same_results(straight, output)
+    else:
+        assert_same_answer(straight, output, 5e-4 if stage == "finer steps" else 1e-6)
 
 
 def test_two_ranks_go_on_too(converged, tmp_path):
