@@ -4,10 +4,11 @@
     apt-get install calculix-ccx
     jobs/corner_calculix.py FOLDER [SIZE [HZ [CONTACTS]]]
 
-SIZE is `mesh.parameters.size` of inputs/corner, 9000 unless given; HZ ends the band, 8000 unless given. CONTACTS are those that are tied,
-for instance 0,1,8; all unless given, none with a single comma; both surfaces of the
-others are held. FOLDER gets the scene with ties in place of contacts, the deck that tools/mesh makes of it, and what both programs write. The leading tabs, 0.1 mm away from
-their abutments, are free in both. Losses are left out of both.
+SIZE is `mesh.parameters.size` of inputs/corner, 9000 unless given; HZ ends the band, 8000 unless given. CONTACTS are those that
+are tied, such as 2,3,4,5,6,7; all unless given. Those of the bracket, 2 to 7, have to be among them: CalculiX refuses nodes that a
+held surface and a coupling share. Both surfaces of the others are held. FOLDER gets the scene with ties in place of contacts, the
+deck that tools/mesh makes of it, and what both programs write. The leading tabs, 0.1 mm away from their abutments, are free in both.
+Losses are left out of both.
 """
 
 import json

@@ -53,27 +53,3 @@ def test_several_unstable_modes_show_each_motion(squeal, tmp_path):
 def test_a_negative_number_of_starts_is_refused(squeal):
     run = squeal(*SCENE, "--set", "cycle.starts=-1", "--dry-run", ranks=1)
     assert run.code == 1 and len(run.messages) == 1 and "cycle.starts=-1" in run.messages[0]
-
-
-BLOCK_ON_BELT = """
-point = [{ name = "block", at = [0, 0, 0], mass = 0.538, free = "x y" }, { name = "belt", at = [0, 0, 0], free = "none" }]
-spring = [{ from = "block", direction = "x", stiffness = 6957, damping = 5.946 }]
-force = [{ on = "block", vector = [0, -10, 0] }]
-contact = [{ rotor = "belt", stator = "block", normal = [0, 1, 0], tangents = [[1, 0, 0]], velocity = [0.05, 0, 0] }]
-friction = { coefficient = 0.2, static_coefficient = 0.6, decay_speed = 1e-3 }
-modes = { band = 100 }
-cycle = { }
-"""
-
-
-@pytest.mark.parametrize("speed, frequency", [(1e-3, 16.620), (2e-3, 16.50094)])
-def test_falling_friction_drives_stick_slip_beside_stable_sliding(converged, tmp_path, speed, frequency):
-    """Without a word of the scene, at as many steps as have one solution. The frequencies are of event-driven
-    integration, from displacements above 1.1 V/omega; smaller ones die out."""
-    scene = tmp_path / "scene.toml"
-    scene.write_text(BLOCK_ON_BELT)
-    report = converged(scene, "--set", f"friction.decay_speed={speed}", ranks=1).report
-    assert report["heard"].startswith("silent: no mode grows in the band, but ")
-    rest, motion = sorted(report["attractors"]["motions"], key=lambda motion: motion["frequency_hz"])
-    assert rest["kind"] == "rest" and motion["kind"] == "steady"
-    assert abs(motion["frequency_hz"] - frequency) < motion["frequency_error"] < 0.02 * frequency
