@@ -154,13 +154,14 @@ RUNS = {
     # the reduced model, a rotation, a mesh, both routes to modes; coarse, and damped like this, its cycle is found in a second
     "pin_on_disc": [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
                     "damping.beta=6e-7", "--set", "cycle.steps_per_period=40", "--set", "modes.method=both",
-                    "-cycle_watched_periods", "40", "--set", "sensitivity.numbers=friction.coefficient"],
+                    "-cycle_watched_periods", "40", "--set", "sensitivity.numbers=friction.coefficient", "--set",
+                    "modes.mesh_error=refinement"],
     # no cycle attracts: a settled motion, whose kind stays undecided over so few periods
     "settled": [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set",
                 "friction.coefficient=0.4", "--set", "modes.method=full", "-cycle_free_periods", "10",
                 "-settled_periods", "32", "--set", "cycle.tolerance=1e-9"],
     # stages that are skipped, with their reasons
-    "stable": [INPUTS / "oscillator" / "scene.toml", "--set", "friction.coefficient=0"],
+    "stable": [INPUTS / "oscillator" / "scene.toml", "--set", "friction.coefficient=0", "--set", "modes.mesh_error=refinement"],
 }
 
 

@@ -195,7 +195,9 @@ def test_a_run_that_ends_in_its_verdict_keeps_the_cycle(ranks, fidelity, watched
         code, printed, errors = interrupted(rf"\A(?:.*\n){{{lines}}}", *asked, "--output", folder, ranks=ranks, after=after)
         report = json.loads((folder / "report.json").read_text())
         cycle = report["cycle"]
-        assert code == report["exit_code"] and code in (0, 3), errors
+        # the signal may find the launcher alone, which it ends
+        done = report["exit_code"] == 0 and code == -signal.SIGUSR1
+        assert done or code == report["exit_code"] and code in (0, 3), errors
         if code == 3 and cycle["outcome"] == "converged" and cycle["multipliers"]["stability"] == "undecided":
             assert "the run was ended" in cycle["multipliers"]["would_decide"]
             assert cycle["frequency_hz"] == pytest.approx(whole.report["cycle"]["frequency_hz"], rel=1e-7)
