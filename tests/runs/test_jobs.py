@@ -138,8 +138,9 @@ def test_many_runs_end_in_order_and_go_on(tmp_path):
     run = job(tmp_path, "many_runs.sh", wait=False, arguments=["--set", "cycle.enabled=false", "--set", "transient.periods=100000"], **knobs)
     wait_for(lambda: len(list(tmp_path.glob("*/.partial/history.h5"))) == 2)
     run.terminate()
-    run.communicate(timeout=300)
-    assert run.returncode == 3 and not (tmp_path / "times.txt").exists() and not (tmp_path / "value_0.5").exists()
+    printed = run.communicate(timeout=300)
+    assert run.returncode == 3, [*printed, *(text.read_text() for text in tmp_path.glob("value_*.txt"))]
+    assert not (tmp_path / "times.txt").exists() and not (tmp_path / "value_0.5").exists()
     for value in ("0.3", "0.4"):
         assert json.loads((tmp_path / f"value_{value}" / "report.json").read_text())["exit_code"] == 3
 
