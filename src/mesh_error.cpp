@@ -22,14 +22,19 @@ public:
   Prolongation(const Model& coarse, const Model& fine) : coarse_(coarse), fine_(fine), parents_(fine.mesh.parents)
   {
     broadcast_packed(parents_, comm_of(fine.structure.load));
-    file_nodes_ = fine.mesh.nodes.size() - (coarse.mesh.nodes.size() - nodes_of_file());
+    int last = -1; // of the elements
+    for (const Element& element : fine.mesh.elements)
+      for (const int node : element.nodes) last = std::max(last, node);
+    file_nodes_ = static_cast<std::size_t>(last) + 1;
   }
 
   /// Whether the finer mesh divides the same one: a geometry may be meshed otherwise the second time.
   bool is_nested() const
   {
-    return std::equal(coarse_.mesh.nodes.begin(), coarse_.mesh.nodes.begin() + std::ptrdiff_t(nodes_of_file()),
-                      fine_.mesh.nodes.begin());
+    const std::size_t others = fine_.mesh.nodes.size() - file_nodes_; // points, which follow those of the file
+    const auto first = coarse_.mesh.nodes.begin(),
+               last = coarse_.mesh.nodes.end() - static_cast<std::ptrdiff_t>(others);
+    return std::equal(first, last, fine_.mesh.nodes.begin());
   }
 
   /// The motion by the shape functions, constraints aside. Collective.
@@ -52,17 +57,6 @@ public:
   }
 
 private:
-  /// Nodes of the coarse mesh that are of its file: points follow them.
-  std::size_t nodes_of_file() const { return coarse_.mesh.nodes.size() - added(); }
-  std::size_t added() const { return fine_.mesh.nodes.size() - fine_file_nodes(); }
-  std::size_t fine_file_nodes() const
-  {
-    int last = -1; // of the elements
-    for (const Element& element : fine_.mesh.elements)
-      for (const int node : element.nodes) last = std::max(last, node);
-    return static_cast<std::size_t>(last) + 1;
-  }
-
   /// Component c of a node of the finer mesh.
   double at(std::size_t node, int c, const std::vector<double>& q) const
   {

@@ -38,8 +38,7 @@ Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const
       const double h = 1 / (mode.frequency_hz() * steps);
       return !friction_refusal(point.sliding(), &mode, settings.theta, h, options.step, 1).empty();
     };
-    while (open && settings.steps_per_period < most_steps && refused(settings.steps_per_period))
-      settings.steps_per_period *= 2;
+    if (open) settings.steps_per_period = permitted_steps(settings.steps_per_period, refused);
     Attractors found = find_attractors(
         {point.sliding(), modes, started, settings, options.step, chosen && point.modes.unstable_count > 0});
     if (chosen && found.outcome.kind == OutcomeKind::not_converged) found.outcome.kind = OutcomeKind::completed;

@@ -1,5 +1,5 @@
 #pragma once
-/// What the mesh leaves open on growth rates and frequencies: modes of the scene's mesh and of one with every element
+/// The error of the mesh in growth rates and frequencies: modes of the scene's mesh and of one with every element
 /// divided (mesh.refine), and where both lead.
 ///
 /// An eigenvalue goes as lambda(h) = lambda + c h^q. With d = lambda(h/2) - lambda(h) the limit is lambda(h/2) + d/(2^q

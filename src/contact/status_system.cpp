@@ -14,6 +14,19 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
+/// The smallest pivot over the largest.
+double pivot_ratio(const Eigen::PartialPivLU<MatrixXd>& factors)
+{
+  const VectorXd pivots = factors.matrixLU().diagonal().cwiseAbs();
+  return pivots.minCoeff() / pivots.maxCoeff();
+}
+
+/// Motions of a unit force along each direction of a pair, by its scales [m/N].
+Vector3d unit_motions(const NaturalScale& rho)
+{
+  return {1 / rho.normal, 1 / rho.tangential, 1 / rho.tangential};
+}
+
 } // namespace
 
 StickSlipOperator make_stick_slip_operator(MatrixXd N, MatrixXd M, int directions, std::vector<int> contact)
@@ -33,18 +46,6 @@ StickSlipOperator make_stick_slip_operator(MatrixXd N, MatrixXd M, int direction
   }
   return result;
 }
-
-namespace
-{
-
-/// The smallest pivot over the largest.
-double pivot_ratio(const Eigen::PartialPivLU<MatrixXd>& factors)
-{
-  const VectorXd pivots = factors.matrixLU().diagonal().cwiseAbs();
-  return pivots.minCoeff() / pivots.maxCoeff();
-}
-
-} // namespace
 
 std::optional<DividedOperator> divided(StickSlipOperator& of)
 {
@@ -73,8 +74,7 @@ namespace
 /// Motions of a pair by its unknowns, [m/N].
 Matrix3d motion_law(const StickSlipOperator& of, std::size_t pair, const Matrix3d& J)
 {
-  const NaturalScale& rho = of.rho[pair];
-  return Vector3d(1 / rho.normal, 1 / rho.tangential, 1 / rho.tangential).asDiagonal() * (J - Matrix3d::Identity());
+  return unit_motions(of.rho[pair]).asDiagonal() * (J - Matrix3d::Identity());
 }
 
 /// Columns of M R - N W in some rows, for reactions R y and motions W y of a pair.
@@ -145,11 +145,11 @@ void StatusSystem::read_laws(const StickSlipFriction& friction, const StickSlipS
     const PairState state = states[pair];
     statuses_.push_back(state.status());
     const Index first = rows.normal(static_cast<Index>(pair));
-    const Vector3d motion(1 / state.rho.normal, 1 / state.rho.tangential, 1 / state.rho.tangential); // of a unit force
     const ProjectedForces to = state.projected();
     laws_.push_back(to.J);
     particular_.r.segment(first, own) += to.p.head(own);
-    particular_.w.segment(first, own) = motion.head(own).cwiseProduct(particular_.r.segment(first, own));
+    particular_.w.segment(first, own) =
+        unit_motions(state.rho).head(own).cwiseProduct(particular_.r.segment(first, own));
   }
 }
 

@@ -129,9 +129,9 @@ CycleSettings chosen_settings(const CycleProblem& problem, const FidelityRequest
   const double turns = problem.given_period * problem.unstable.modes.front().frequency_hz(); // of the mode, if given
   settings.steps_per_period =
       (chooses ? request.begin_steps : plain_steps) * std::max(1, static_cast<int>(std::lround(turns)));
-  while (chooses && settings.steps_per_period < most_steps &&
-         !step_refusal_of(problem, settings.steps_per_period).empty())
-    settings.steps_per_period *= 2;
+  if (chooses)
+    settings.steps_per_period =
+        permitted_steps(settings.steps_per_period, [&](int steps) { return !step_refusal_of(problem, steps).empty(); });
   return settings;
 }
 

@@ -32,7 +32,7 @@ using Places = std::vector<Vector3d>; // natural coordinates
 /// gmsh's numbers of the lines of 2 and 3 nodes. Each is the first side of a quadrangle: nodes 0, 1 and 4.
 constexpr int line2 = 1, line3 = 8;
 
-/// What the types of the file have in common. Simplices have their corners at 0 and at unit vectors.
+/// Forms of elements, whatever their order. Simplices have their corners at 0 and at unit vectors.
 enum class Form
 {
   line,

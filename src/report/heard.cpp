@@ -183,7 +183,7 @@ std::string starts_text(const Report& report)
                 other->starts.size(), elsewhere.c_str());
 }
 
-/// What the steps may leave, where it is more than the accuracy.
+/// The errors of the steps, where one is above the accuracy.
 std::string missed_accuracy(const Fidelity& fidelity)
 {
   const double frequency = fidelity.step_frequency_error, energy = fidelity.step_energy_error;

@@ -345,7 +345,7 @@ void add_fidelity(Entry whole, const Fidelity& fidelity)
                "relative error of the frequency by the model", fidelity.frequency_error);
   errors.check(!(fidelity.energy_error > fidelity.accuracy), "energy", "-",
                "relative error of the mean fluctuating energy by the model", fidelity.energy_error);
-  // of steps that the scene gives they are told, and nothing was promised
+  // the accuracy bounds the error of steps that squeal chooses; that of the scene's own steps is a result
   const double most = fidelity.chooses_steps ? fidelity.accuracy : HUGE_VAL;
   errors.check(!(fidelity.step_frequency_error > most), "step_frequency", "-",
                "relative error of the frequency by the step", fidelity.step_frequency_error);

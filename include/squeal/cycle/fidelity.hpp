@@ -20,8 +20,13 @@ namespace squeal
 inline constexpr int first_steps = 64;
 inline constexpr double plain_tolerance = 1e-5;
 
-/// Steps a period at most that are tried where fewer are refused.
-inline constexpr int most_steps = 4096;
+/// Twice as many steps a period, and again, while they are refused and few enough to try.
+template <class Refused> int permitted_steps(int steps, const Refused& is_refused)
+{
+  constexpr int most = 4096;
+  while (steps < most && is_refused(steps)) steps *= 2;
+  return steps;
+}
 
 /// The model asked for, and how accurate its cycle shall be.
 struct FidelityRequest
