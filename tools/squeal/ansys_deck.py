@@ -1,4 +1,4 @@
-"""Decks of Ansys, as CDWRITE writes them, to a mesh_model.Model: blocks of nodes, elements and components, materials,
+"""Decks of Ansys, as CDWRITE and Workbench write them, to a mesh_model.Model: blocks of nodes, elements and components, materials,
 supports, loads, contact pairs and bolts."""
 
 import re
@@ -8,6 +8,7 @@ import numpy as np
 from squeal import ansys_equations
 from squeal import ansys_joining
 from squeal import ansys_loads
+from squeal import ansys_selection
 from squeal.ansys_joining import Side
 from squeal.common import counted
 from squeal.deck_files import Problem, lines_of, number, span, whole
@@ -23,9 +24,12 @@ ORTHOTROPIC = ("EX", "EY", "EZ", "PRXY", "PRXZ", "PRYZ", "GXY", "GXZ", "GYZ")
 # hexahedra that stand for wedges and tetrahedra: which of their corners and mid-sides are the other's
 WEDGE_OF = [0, 1, 2, 4, 5, 6]
 TET_OF = [0, 1, 2, 4]
-SILENT = set("/COM /NOPR /GOPR /PREP7 /TITLE /SOLU /GO /OUTPUT /UNITS /VIEW /AUTO FINISH NUMOFF *IF *ELSE *ENDIF *SET DOF MPTEMP "
+SILENT = set("/COM /NOPR /GOPR /PREP7 /TITLE /SOLU /GO /OUTPUT /UNITS /VIEW /AUTO FINISH NUMOFF *IF *ELSE *ENDIF DOF MPTEMP "
              "EXTOPT TREF IRLF BFUNIF CGLOC KUSE TIME CRPLIM NCNV "
-             "NEQIT ERESX TOFFST ANTYPE ETBLOCK LSCLEAR FCUM DELTIM KBC SHPP SHELL".split())
+             "NEQIT ERESX TOFFST ANTYPE LSCLEAR FCUM DELTIM KBC SHPP SHELL "
+             "/BATCH /CONFIG /WB /NOLIST /GOLIST /GST /EOF /POST1 /XML /AUX15 XMLO *GET *DIM ETCON OUTRES RESCONTROL RESC NSUB NSUBST EQSL "
+             "EQSLV DMPOPT DMPOPTION CNTR SOLVE CEWRITE CMWRITE NLDIAG SCOPT RSTSUPPRESS AUTOTS CNCHECK FINI CDWRITE TSHAPE RMODIF "
+             "LUMPM MXPAND MODCONTROL QRDOPT".split())
 
 
 class Deck:
@@ -52,6 +56,9 @@ class Deck:
         self.section, self.is_pretension = 0, False  # that data are of
         self.section_names, self.directions, self.tension, self.thickness = {}, {}, {}, {}  # by section
         self.systems = Counter()  # elements by material and coordinate system
+        self.state = ansys_selection.State()
+        self.skin_types, self.pressed_nodes = {}, []  # types of surface elements; (nodes, value, place)
+        self.nodes_of, self.add_element = ansys_loads.nodes_of, add_element
         self.alpha = self.beta = 0.0
 
     def note(self, what, place):
@@ -78,19 +85,24 @@ class Lines:
 def read_cdb(file):
     deck, lines = Deck(file), Lines(file)
     while lines.more():
-        line = lines.next().split("!")[0].strip()
-        if not line:
-            continue
-        words = [word.strip() for word in line.split(",")]
-        name = words[0].upper()
-        if name in BLOCKS:
-            BLOCKS[name](words, lines, deck)
-        elif name in COMMANDS:
-            COMMANDS[name](words, lines.place(), deck)
-        elif re.match(r"[A-Z/*]", name) and name not in SILENT and not name.startswith("_"):
-            deck.left_out[name] += 1
+        line = re.sub(r"\s{2,}S\s+\d+$", "", lines.next().split("!")[0].strip())  # load steps have their lines numbered so
+        if line[:4].upper() == "/COM":
+            ansys_selection.body_title(line, deck)
+        elif line and not ansys_selection.assignment(line, deck):
+            for command in line.split("$"):
+                read_command(ansys_selection.filled([word.strip() for word in command.split(",")], deck), lines, deck)
     finish(deck)
     return deck.model
+
+
+def read_command(words, lines, deck):
+    name = words[0].upper()
+    if name in BLOCKS:
+        BLOCKS[name](words, lines, deck)
+    elif name in COMMANDS:
+        COMMANDS[name](words, lines.place(), deck)
+    elif re.match(r"[A-Z/*]", name) and name.split()[0] not in SILENT and not name.startswith("_"):
+        deck.left_out[name] += 1
 
 
 # ---- blocks
@@ -99,7 +111,7 @@ def read_cdb(file):
 def widths_of(text, place):
     """Widths of fields of a Fortran format such as (3i9,6e21.13e3); what letters they have."""
     found = []
-    for count, letter, width in re.findall(r"(\d*)([ieg])(\d+)", text.lower()):
+    for count, letter, width in re.findall(r"(\d*)([aieg])(\d+)", text.lower()):
         found += [(letter, int(width))] * int(count or 1)
     if not found or len(found) > 100:
         raise Problem(f"{place}: '{text.strip()[:40]}': expected a format such as (3i9,6e21.13e3)")
@@ -124,7 +136,8 @@ def read_nodes(words, lines, deck):
     first = sum(letter == "i" for letter, _ in widths)
     while lines.more():
         line = lines.next()
-        if line.lstrip()[:2].upper() in ("N,", "-1", "NB") or not line.strip():
+        if not line.lstrip()[:1].isdigit():
+            lines.at -= line.strip()[:2].upper() not in ("-1", "N,", "")  # Workbench ends a block by the next command
             break
         fields = fields_of(line, widths)
         position = [number(field or "0", lines.place()) for field in fields[first : first + 3]]
@@ -148,28 +161,32 @@ def node(words, place, deck):
 
 
 def read_elements(words, lines, deck):
-    """EBLOCK of solids: material, type, real, section, system, four others, count, an empty one, number, nodes."""
+    """EBLOCK of solids: material, type, real, section, system, four others, count, an empty one, number, nodes. Others: number,
+    type, real, material, system, nodes."""
     if not lines.more():
         raise Problem(f"{lines.place()}: EBLOCK without a format")
     widths = widths_of(lines.next(), lines.place())
     solid = len(words) > 2 and words[2].upper() == "SOLID"
+    before = {key: len(of) for key, of in deck.bodies.items()}
     while lines.more():
         fields = fields_of(lines.next(), widths)
         place = lines.place()
         if not fields or fields[0] == "-1":
             break
         values = [whole(field, place) for field in fields]
+        if len(values) < (11 if solid else 6):
+            raise Problem(f"{place}: {len(values)} fields; expected {11 if solid else 5} before the nodes of an element")
         if not solid:
-            deck.left_out["EBLOCK of no SOLID"] += 1
+            label, kind, real, material, system = values[:5]
+            add_element(deck, place, label, [material, kind, real, 0, system], values[5:])
             continue
-        if len(values) < 11:
-            raise Problem(f"{place}: {len(values)} fields; expected 11 before the nodes of an element")
         count = values[8]
         while len(values) < 11 + count and lines.more():
             values += [whole(field, place) for field in fields_of(lines.next(), widths)]
         if len(values) != 11 + count:
             raise Problem(f"{place}: {len(values) - 11} nodes; expected {count}")
         add_element(deck, place, values[10], values[:5], values[11:])
+    ansys_selection.name_bodies(before, deck)
 
 
 def kind_of(kind, nodes, place):
@@ -200,6 +217,7 @@ def kind_of(kind, nodes, place):
 def add_element(deck, place, label, attributes, nodes):
     material, kind_number, real, section, system = attributes
     kind, model = deck.types.get(kind_number), deck.model
+    deck.state.last = max(deck.state.last, label)
     if kind in SOLIDS:
         shape, nodes = kind_of(kind, nodes, place)
         model.add_element(place, label, shape, nodes, "abaqus")
@@ -218,13 +236,13 @@ def add_element(deck, place, label, attributes, nodes):
     elif kind == 179:
         deck.bolts.setdefault(section, []).append((place, nodes))
     elif kind in SKINS:
-        deck.skins[label] = face_of(nodes)
+        deck.skins[label], deck.skin_types[label] = face_of(nodes), kind_number
     elif kind == 14:
         deck.springs.append((place, nodes, real, kind_number))
     elif kind == 21:
         deck.masses.append((place, nodes[0], real, kind_number))
     else:
-        deck.other_elements[f"type {kind}"] += 1
+        deck.other_elements[f"type {kind}" if kind else f"type number {kind_number}, which no ET or ETBLOCK says"] += 1
 
 
 def face_of(nodes):
@@ -275,7 +293,21 @@ def read_reals(words, lines, deck):
         deck.reals[whole(fields[0], place)] = values
 
 
-BLOCKS = {"RLBLOCK": read_reals, "SECBLOCK": ansys_equations.section_block, "SFE": ansys_loads.surface_load,
+def read_types(words, lines, deck):
+    """ETBLOCK: number, element type, and its options from the first on."""
+    if not lines.more():
+        raise Problem(f"{lines.place()}: ETBLOCK without a format")
+    widths = widths_of(lines.next(), lines.place())
+    while lines.more():
+        fields = fields_of(lines.next(), widths)
+        if len(fields) < 2 or fields[0] == "-1":
+            break
+        values = [whole(field or "0", lines.place()) for field in fields]
+        deck.types[values[0]] = values[1]
+        deck.options |= {(values[0], i): value for i, value in enumerate(values[2:], 1)}
+
+
+BLOCKS = {"ETBLOCK": read_types, "DBLOCK": ansys_loads.support_block, "SFEBLOCK": ansys_loads.surface_block, "RLBLOCK": read_reals, "SECBLOCK": ansys_equations.section_block, "SFE": ansys_loads.surface_load,
           "NBLOCK": read_nodes, "EBLOCK": read_elements, "CMBLOCK": read_component}
 
 # ---- commands
@@ -300,7 +332,8 @@ def material_data(words, place, deck):
             deck.left_out["MPDATA of further temperatures"] += 1
         if start not in ("", "1"):
             return
-    deck.constants.setdefault(whole(material, place), {})[label.upper()] = number(value, place)
+    if label.upper() not in ("UVID", "UMID"):  # names of Workbench
+        deck.constants.setdefault(whole(material, place), {})[label.upper()] = number(value, place)
 
 
 def key_option(words, place, deck):
@@ -320,9 +353,9 @@ def rotation(words, place, deck):
         deck.turning.append((words[1] if len(words) > 1 else "", rate, place))
 
 
-COMMANDS = {"R": real_constants, "CMROTATE": rotation, "KEYOPT": key_option, "KEYOP": key_option, "ET": element_type, "MPDATA": material_data, "MP": material_data,
+COMMANDS = {"R": real_constants, "CMROTATE": rotation, "KEYOPT": key_option, "KEYOP": key_option, "KEYO": key_option, "ET": element_type, "MPDATA": material_data, "MP": material_data,
             "N": node, "CE": ansys_equations.read_equation, "SECTYPE": ansys_equations.section_type, "SECDATA": ansys_equations.section_data,
-            "SLOAD": ansys_equations.section_load, **ansys_loads.COMMANDS}
+            "SLOAD": ansys_equations.section_load, **ansys_loads.COMMANDS, **ansys_selection.COMMANDS}
 
 
 # ---- what the whole deck makes
@@ -331,12 +364,12 @@ COMMANDS = {"R": real_constants, "CMROTATE": rotation, "KEYOPT": key_option, "KE
 def finish(deck):
     model = deck.model
     if not model.nodes:
-        raise Problem(f"{model.source}: no NBLOCK")
+        raise Problem(f"{model.source}: no nodes, as NBLOCK or N; expected a deck that CDWRITE,DB or Workbench writes")
     for material, constants in deck.constants.items():
         model.materials[material] = material_of(constants, material, deck)
     several = Counter(material for material, _ in deck.bodies)
     for (material, section), elements in deck.bodies.items():
-        name = f"material_{material}" + (f"_shells_{section}" if section and several[material] > 1 else "")
+        name = deck.state.body_names.get((material, section)) or f"material_{material}" + (f"_shells_{section}" if section and several[material] > 1 else "")
         model.parts[model.unused(name)] = Part(elements, material, deck.thickness.get(section, 0.0) if section else 0.0)
     ansys_equations.bolts(deck)
     ansys_equations.rigid_regions(deck)

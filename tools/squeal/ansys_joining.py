@@ -4,7 +4,7 @@ import math
 from enum import StrEnum
 
 from squeal.deck_files import Problem, undefined
-from squeal.mesh_model import MOTIONS, corners_of
+from squeal.mesh_model import FLAT, MOTIONS, corners_of
 
 
 class Side(StrEnum):
@@ -82,26 +82,38 @@ def couple(deck, pair, pilot, surface):
         joints.rigid.append((pilot, surface, " ".join(MOTIONS), where))
 
 
+def faces_that_bear(model):
+    """Free faces of solids, and shells, by their corners."""
+    shells = {corners_of(nodes): nodes for kind, nodes in model.elements.values() if kind in FLAT}
+    return {**shells, **model.free_faces(model.solids())}
+
+
 def pairs(deck, rotors):
     """Contact and target elements of one real constant are a contact; its material has the friction. Sides that have no faces
-    of solids are gaps to be filled. rotors: turns by the sides of contacts."""
-    model, free = deck.model, None
+    of solids or shells are gaps to be filled. rotors: turns by the sides of contacts."""
+    model = deck.model
+    free = faces_that_bear(model) if deck.of_pair else {}
+    known = {}  # pairs by their faces
     for real, pair in deck.of_pair.items():
-        free = free or model.free_faces(model.solids())
+        sides = tuple(frozenset(map(corners_of, (face for face in pair.get(side, ()) if len(face) in (3, 4, 6, 8)))) for side in Side)
+        if all(sides) and (before := known.setdefault(frozenset(sides), real)) != real:
+            model.notes.append(f"the contact elements of real constant {real}, which are those of {before} with the sides changed")
+            continue
         names = []
+        pilot = [face[0] for face in pair.get(Side.TARGET, ()) if len(face) == 1 and face[0] in model.nodes]
         for side in Side:
             given = [face for face in pair.get(side, []) if side is Side.CONTACT or len(face) > 1]  # of one node is a pilot
             faces = [free[corners_of(face)] for face in given if len(face) in (3, 4, 6, 8) and corners_of(face) in free]
-            dots = [face[0] for face in given if len(face) == 1]
-            if len(faces) + len(dots) < len(given):
-                model.notes.append(f"{len(given) - len(faces) - len(dots)} {side} elements of real constant {real}, which lie on no solid")
+            bare = [face for face in given if len(face) == 1 or pilot and corners_of(face) not in free]  # nodes alone follow a pilot
+            dots = [n for face in bare for n in face]
+            if len(faces) + len(bare) < len(given):
+                model.notes.append(f"{len(given) - len(faces) - len(bare)} {side} elements of real constant {real}, which lie on no solid and no shell")
             names.append(model.unused(f"{side}_{real}") if faces or dots else
-                         f"FILL IN [a surface]: real constant {real} of the deck has no {side} elements on faces of solids")
+                         f"FILL IN [a surface]: real constant {real} of the deck has no {side} elements on faces of solids or shells")
             if faces:
                 model.surfaces[names[-1]] = faces
             elif dots:
                 model.node_sets[names[-1]] = list(dict.fromkeys(dots))
-        pilot = [face[0] for face in pair.get(Side.TARGET, ()) if len(face) == 1 and face[0] in model.nodes]
         if pilot and not names[0].startswith("FILL IN"):
             couple(deck, pair, pilot[0], names[0])
             continue

@@ -1,7 +1,8 @@
 """Supports, loads and damping of an Ansys deck. Nodes may have their motions along axes of their own."""
 
 import numpy as np
-from squeal.deck_files import number, span, whole
+from squeal import ansys_selection
+from squeal.deck_files import Problem, number, span, whole
 from squeal.mesh_model import FLAT, MOTIONS, corners_of
 
 MOTION_OF = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "rx", "ROTY": "ry", "ROTZ": "rz"}
@@ -14,7 +15,7 @@ def nodes_of(words, place, deck):
     """One node, those up to the sixth word by steps of the seventh, those of a component, or all."""
     text = words[1] if len(words) > 1 else ""
     if text.upper() == "ALL":
-        return list(deck.model.nodes)
+        return ansys_selection.selected_nodes(words, place, deck)
     named = next((nodes for name, nodes in deck.model.node_sets.items() if name.upper() == text.upper()), None)
     if named is not None:
         return named
@@ -25,7 +26,11 @@ def nodes_of(words, place, deck):
 
 def support(words, place, deck):
     """D,node,label,value, …, last node, step, other labels."""
-    value = number(words[3] or "0", place) if len(words) > 3 else 0.0
+    text = words[3] if len(words) > 3 and words[3] else "0"
+    if text[0] == "%":
+        deck.note(f"the table {text} of D on node {words[1]}, which has no numbers: it is held", place)
+        text = "0"
+    value = number(text, place)
     for label in [word.upper() for word in words[2:3] + words[7:] if word]:
         motions = {"ALL": MOTIONS}.get(label, (MOTION_OF[label],) if label in MOTION_OF else ())
         if not motions:
@@ -47,17 +52,58 @@ def force(words, place, deck):
 
 def surface_load(words, lines, deck):
     """SFE,element,face,PRES,part,values, or R5.0 in their place and the values in the next line."""
+    if words[1:2] and words[1].upper() == "END":
+        return
     place, words = lines.place(), words + [""] * 6
     values = words[5:9]
     if values[0].upper().startswith("R"):
         values = lines.next().replace(",", " ").split() if lines.more() else []
+    if words[1].upper() != "ALL":
+        press_element(whole(words[1], place), words[2], words[3], words[4], values, place, deck)
+        return
+    for n in deck.state.elements or ():
+        press_element(n, words[2], words[3], words[4], values, place, deck)
+    if deck.state.elements is None or deck.state.unread:
+        deck.note(f"SFE on all elements that {deck.state.unread or 'are there'} selects", place)
+
+
+def press_element(label, side, what, part, values, place, deck):
+    """The pressure at the corners of an element's face; part 2 is imaginary."""
     values = [number(value, place) for value in values if value]
-    if words[3].upper() != "PRES" or words[4] == "2":
-        deck.left_out[f"SFE of {words[3]}"] += 1
+    if what.upper() != "PRES" or part == "2":
+        deck.left_out[f"SFE of {what}"] += 1
     elif values and any(values):
         if any(value != values[0] for value in values if value):
-            deck.note(f"other pressures at the corners of element {words[1]}", place)
-        deck.pressed.append((whole(words[1], place), whole(words[2], place), values[0], place))
+            deck.note(f"other pressures at the corners of element {label}", place)
+        deck.pressed.append((label, whole(side, place), values[0], place))
+
+
+def rows_of(lines):
+    """Fields and places of the lines of a block below its format, up to one that begins with no number."""
+    if not lines.more():
+        raise Problem(f"{lines.place()}: a block without a format")
+    lines.next()
+    while lines.more():
+        fields = lines.next().split()
+        if not fields or not fields[0].isdigit():
+            lines.at -= 1
+            return
+        if len(fields) < 3:
+            raise Problem(f"{lines.place()}: {len(fields)} fields; expected a number, two labels and values")
+        yield fields, lines.place()
+
+
+def support_block(words, lines, deck):
+    """DBLOCK: node, label, value, imaginary part a line."""
+    for fields, place in rows_of(lines):
+        support(["D", *fields[:3]], place, deck)
+
+
+def surface_block(words, lines, deck):
+    """SFEBLOCK,kind,label,elements,lines: element, face, part, values a line."""
+    label = words[2] if len(words) > 2 else ""
+    for fields, place in rows_of(lines):
+        press_element(whole(fields[0], place), fields[1], label, fields[2], fields[3:], place, deck)
 
 
 def gravity(words, place, deck):
@@ -152,7 +198,7 @@ def supports(deck):
 def pressures(deck):
     """Faces of solids, and those that surface elements lie on."""
     model, pressed = deck.model, {}
-    free = model.free_faces(model.solids()) if deck.pressed else {}
+    free = model.free_faces(model.solids()) if deck.pressed or deck.pressed_nodes else {}
     for label, side, value, place in deck.pressed:
         face = None
         if label in deck.skins:
@@ -164,4 +210,10 @@ def pressures(deck):
             deck.note(f"the pressure on face {side} of element {label}, which is none of a solid", place)
         else:
             pressed.setdefault(value, []).append(face)
+    for nodes, value, place in deck.pressed_nodes:
+        faces = [face for face in free.values() if nodes.issuperset(face)]
+        if faces and value:
+            pressed.setdefault(value, []).extend(faces)
+        elif not faces:
+            deck.note("the pressure of SF on nodes that cover no face of solids", place)
     model.press(pressed)

@@ -325,7 +325,7 @@ def sorted_corners(corners):
 
 
 def corners_of(face):
-    return frozenset(face[: {3: 3, 6: 3, 4: 4, 8: 4}[len(face)]])
+    return frozenset(face[: {6: 3, 8: 4}.get(len(face), len(face))])
 
 
 # ---- gmsh's format 4.1

@@ -156,7 +156,9 @@ def write_loads(model, made, names, writer):
 def material(model, part):
     known = model.materials.get(part.material, {}) if part.material else {}
     lacks = f"the deck has no material {part.material}" if part.material and part.material not in model.materials else "the deck has none"
-    keys = {}
+    keys, shells = {}, model.elements[part.elements[0]][0] not in KINDS
+    if "orthotropic" in known and shells:
+        known, lacks = {key: of for key, of in known.items() if key != "orthotropic"}, f"material {part.material} is orthotropic, which solids can be alone"
     if "orthotropic" in known:
         keys["orthotropic"] = {**known["orthotropic"], **(part.axes or {})}
     else:
@@ -166,6 +168,6 @@ def material(model, part):
     keys["density"] = known["density"] if known.get("density") else f"FILL IN [kg/m3]: {lacks}"
     damping = {**known, "loss_factor": known.get("loss_factor", 0) + model.loss_factor}
     keys |= {key: damping[key] for key in ("loss_factor", "alpha", "beta") if damping.get(key)}
-    if model.elements[part.elements[0]][0] not in KINDS:
+    if shells:
         keys["thickness"] = part.thickness or "FILL IN [m]: these are shells; or remove this part, if they are the surface of a solid"
     return keys
