@@ -30,7 +30,10 @@ HANDLERS = {**abaqus_joining.HANDLERS, **abaqus_steps.HANDLERS}
 READ = {*OPTIONS, *HANDLERS, "ELSET", "NSET", "MATERIAL", "ORIENTATION"}
 SILENT = set("HEADING,PREPRINT,OUTPUT,NODE OUTPUT,ELEMENT OUTPUT,CONTACT OUTPUT,ENERGY OUTPUT,MODAL OUTPUT,NODE FILE,"
              "EL FILE,CONTACT FILE,NODE PRINT,EL PRINT,CONTACT PRINT,RESTART,FILE FORMAT,PRINT".split(","))  # ask for results
-LINES = ("SPRING", "DASHPOT", "MASS", "ROTARYI", *abaqus_joining.BEAMS)  # elements that keywords of their sections read
+OTHERS = ("PLASTIC", "DISTRIBUTION", "UNCOUPLED TEMPERATURE-DISPLACEMENT")  # that look like those that are read
+SPELLINGS = {name.replace(" ", ""): name for name in (*READ, *SILENT, *",".join(OPTIONS.values()).split(","), "END PART", "END INSTANCE",
+                                                      "END ASSEMBLY", "OLD SET", "NEW SET", "CHANGE NUMBER", "SHIFT NODES", "ELEMENT SHIFT")}
+LINES = ("SPRING", "DASHPOT", "MASS", "ROTARYI", "DCOUP", *abaqus_joining.BEAMS)  # elements that keywords of their sections read
 
 
 def kind_of(name, place):
@@ -84,6 +87,7 @@ class Deck:
         self.coupling = None  # node, surface and block of the last *COUPLING
         self.pretension, self.tension, self.beams = {}, {}, {}  # by node, by node, by element
         self.used = set()  # nodes of elements
+        self.surface_names = {}  # those of surfaces of nodes whose name a set of others has, by theirs in capitals
         self.bare_surfaces = {}  # that are defined and have no faces of elements: their names by their own in capitals
 
     def line_of(self, place):
@@ -106,6 +110,7 @@ class Deck:
         """The name of a surface or of a set of nodes, as the deck writes it first; None of one whose faces are left out."""
         if text.upper() in self.bare_surfaces:
             return None
+        text = self.surface_names.get(text.upper(), text)
         known = {name.upper(): name for name in (*self.model.node_sets, *self.model.surfaces)}
         if text.upper() not in known:
             raise undefined(place, what, text, [*self.model.surfaces, *self.model.node_sets])
@@ -116,7 +121,7 @@ class Deck:
 
 
 def read_inp(file):
-    deck = Deck(file, made_explicit(flattened(blocks_of(file))))
+    deck = Deck(file, made_explicit(flattened([spelled(block) for block in blocks_of(file)])))
     model, blocks, nodes, elements = deck.model, deck.blocks, deck.nodes, deck.elements
     labels, positions = abaqus_nodes(blocks)
     model.nodes = dict(zip(labels.tolist(), positions))
@@ -149,6 +154,13 @@ def read_inp(file):
     return model
 
 
+def spelled(block):
+    """With blanks in its keyword and options as they are read: CalculiX takes REFNODE for REF NODE."""
+    block.name = SPELLINGS.get(block.name.replace(" ", ""), block.name)
+    block.options = {SPELLINGS.get(key.replace(" ", ""), key): value for key, value in block.options.items()}
+    return block
+
+
 def name_nodes(model):
     """Reference nodes have the name of a set that has no other node."""
     for name, items in model.node_sets.items():
@@ -163,7 +175,7 @@ def note_what_is_left_out(deck):
     found = {}
     for block in deck.blocks:
         if block.name not in READ | SILENT:
-            near = difflib.get_close_matches(block.name, READ, 1, 0.85)
+            near = [] if block.name in OTHERS else difflib.get_close_matches(block.name, READ, 1, 0.85)
             found.setdefault(f"*{block.name}" + (f", is it *{near[0]}?" if near else ""), []).append(block.place)
         for key, value in block.options.items() if block.name in OPTIONS else ():
             if key not in OPTIONS[block.name].split(",") and f"{key}={value}".upper() not in ("OFFSET=SMID", "OP=MOD"):
@@ -265,14 +277,18 @@ def read_surfaces(deck):
             for place, fields in rows:
                 found += [int(fields[0])] if fields[0].isdecimal() else nodes.get(fields[0], place, "the node set")
             if name in model.node_sets and set(model.node_sets[name]) != set(found):
-                raise Problem(f"{block.place}: the surface '{name}' has other nodes than the set of this name: give it "
-                              "another name")
+                deck.surface_names[name.upper()] = model.unused(name + "_surface")
+                model.notes.append(f"the name {name} of a surface, which a set of other nodes has: it is {deck.surface_names[name.upper()]}")
+                name = deck.surface_names[name.upper()]
             model.node_sets[name] = found
         else:
             faces = []
             for place, fields in rows:
                 of, side = fields[0], fields[1].upper() if len(fields) > 1 else ""
                 numbers = [int(of)] if of.isdecimal() else elements.sets.get(of, place, "the element set")
+                if re.fullmatch("S[3-6]", side) and any(model.elements[n][0] in FLAT for n in numbers if n in model.elements):
+                    model.notes.append(f"{side} of the surface {name} ({deck.line_of(place)}), which are edges of flat elements")
+                    continue
                 faces += faces_of(model, numbers, side, place, elements.left_out)
             if faces:
                 model.surfaces[name] = faces
@@ -293,7 +309,7 @@ def faces_of(model, numbers, side, place, left_out):
         return flat + [face for key, face in model.free_faces(solid).items() if key in free]
     faces = []
     for n in numbers:
-        all_faces = model.faces(n)
+        all_faces = model.faces(n) * (2 if model.elements[n][0] in FLAT else 1)  # a shell has S1 and S2
         if not re.fullmatch(r"S[1-6]", side) or not int(side[1]) <= len(all_faces):
             raise Problem(f"{place}: face '{side}' of element {n}: expected S1 to S{len(all_faces)}, SPOS or SNEG")
         faces.append(all_faces[int(side[1]) - 1])
@@ -367,11 +383,12 @@ def motions_of(fields, place, name, deck):
         return set(NAMED_SUPPORTS[word].split()), 0.0
     first = whole(word, place, "a motion from 1 to 6, or a word such as ENCASTRE")
     last = whole(fields[2], place) if len(fields) > 2 and fields[2] else first
-    if not 1 <= first <= last:
+    if not 0 <= first <= last:
         raise Problem(f"{place}: motions {first} to {last}; expected 1 to 6")
-    if last > 6:
-        deck.model.notes.append(f"the degrees of freedom from {max(first, 7)} on of {name} ({deck.line_of(place)})")
-    value = number(fields[3] or "0", place) if first <= 6 and len(fields) > 3 else 0.0
+    if last > 6 or first == 0:  # temperatures, pressures, flows
+        deck.model.notes.append(f"the degrees of freedom from {max(first, 7) if first else 0} on of {name} ({deck.line_of(place)})")
+    value = number(fields[3] or "0", place) if 1 <= first <= 6 and len(fields) > 3 else 0.0
+    first = first or 7
     return {MOTIONS[i - 1] for i in range(first, min(last, 6) + 1)}, value
 
 

@@ -71,6 +71,14 @@ def distributing(block, deck):
         deck.model.joints.mean.append((node, surface, 1.0, deck.line_of(head.place)))
 
 
+def distributing_coupling(block, deck):
+    """Lines of nodes and weights below it follow the node of its element; a zero weight is one, as of all alike."""
+    for _, _, nodes in list(lines_of_set(block, deck, ("DCOUP",))):
+        for place, fields in block.rows(1, "a node or a set, and a weight"):
+            weight = number(fields[1], place) if len(fields) > 1 and fields[1] else 1.0
+            deck.model.joints.mean.append((nodes[0], group_of(fields[0], place, deck), weight or 1.0, deck.line_of(place)))
+
+
 def kinematic_coupling(block, deck):
     node = one_node(block.options.get("REF NODE", ""), block.place, deck)
     for place, fields in block.rows(1, "a set of nodes, and motions"):
@@ -101,11 +109,14 @@ def rigid_body(block, deck):
 
 def mpc(block, deck):
     """BEAM, TIE and PIN of a set and a reference node are a rigid coupling, of two reference nodes a locked connector."""
-    for place, fields in block.rows(3, "a type and two nodes or sets"):
+    form = "a type and two nodes or sets"
+    for place, fields in block.rows(1, form):
         kind = fields[0].upper()
         if kind not in ("BEAM", "TIE", "PIN"):
             deck.note(f"*MPC of type {kind}", place)
             continue
+        if len(fields) < 3:
+            raise Problem(f"{place}: *MPC, '{', '.join(fields)}': {len(fields)} fields; expected {form}")
         motions = " ".join(MOTIONS[:3]) if kind == "PIN" else ALL
         node = one_node(fields[-1], place, deck)
         for text in fields[1:-1]:
@@ -126,6 +137,9 @@ def distance(deck, a, b):
 
 def equation(block, deck):
     """Of one motion: held. Of the same motion of two reference nodes in one place: a connector. Others are left out."""
+    if "REMOVE" in block.options:
+        deck.note("*EQUATION, REMOVE", block.place)
+        return
     rows, i = list(block.rows()), 0
     while i < len(rows):
         place, fields = rows[i]
@@ -260,11 +274,11 @@ def pre_tension(block, deck):
     deck.model.joints.of_bolts.add(node)
 
 
-HANDLERS = {"COUPLING": coupling, "KINEMATIC": kinematic, "DISTRIBUTING": distributing, "KINEMATIC COUPLING": kinematic_coupling,
+HANDLERS = {"COUPLING": coupling, "KINEMATIC": kinematic, "DISTRIBUTING": distributing, "DISTRIBUTING COUPLING": distributing_coupling, "KINEMATIC COUPLING": kinematic_coupling,
             "RIGID BODY": rigid_body, "MPC": mpc, "EQUATION": equation, "SPRING": spring, "DASHPOT": spring, "MASS": mass,
             "ROTARY INERTIA": rotary_inertia, "BEAM SECTION": beam_section, "PRE-TENSION SECTION": pre_tension}
 OPTIONS = {"COUPLING": "CONSTRAINT NAME,REF NODE,SURFACE,ALPHA", "KINEMATIC": "", "DISTRIBUTING": "WEIGHTING METHOD,COUPLING",
-           "KINEMATIC COUPLING": "REF NODE", "RIGID BODY": "REF NODE,NSET,TIE NSET,PIN NSET,ELSET,ANALYTICAL SURFACE,POSITION",
-           "MPC": "", "EQUATION": "", "SPRING": "ELSET,NONLINEAR,ORIENTATION,RTOL", "DASHPOT": "ELSET,NONLINEAR,ORIENTATION,RTOL",
+           "DISTRIBUTING COUPLING": "ELSET", "KINEMATIC COUPLING": "REF NODE", "RIGID BODY": "REF NODE,NSET,TIE NSET,PIN NSET,ELSET,ANALYTICAL SURFACE,POSITION",
+           "MPC": "", "EQUATION": "REMOVE", "SPRING": "ELSET,NONLINEAR,ORIENTATION,RTOL", "DASHPOT": "ELSET,NONLINEAR,ORIENTATION,RTOL",
            "MASS": "ELSET", "ROTARY INERTIA": "ELSET", "BEAM SECTION": "ELSET,MATERIAL,SECTION", "PRE-TENSION SECTION":
            "SURFACE,NODE,ELEMENT,NAME"}

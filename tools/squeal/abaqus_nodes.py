@@ -4,7 +4,7 @@
 import numpy as np
 from squeal.deck_files import Block, Problem, node_table, number, span, whole
 
-REFUSED = {"NMAP": "maps nodes", "SYMMETRIC MODEL GENERATION": "makes nodes", "SUBSTRUCTURE GENERATE": "makes elements"}
+REFUSED = {"NMAP": "maps nodes", "SYMMETRIC MODEL GENERATION": "makes nodes"}
 
 
 class Made:
@@ -121,7 +121,7 @@ def node(block, made):
     moved = kind not in ("R", "") or np.any(made.origin) or not np.array_equal(made.axes, np.eye(3))
     nodes = {}
     for place, fields in block.rows():
-        if not 2 <= len(fields) <= 7:
+        if not 1 <= len(fields) <= 7:
             raise Problem(f"{place}: {len(fields)} fields; expected a node's number and its x, y, z")
         at = floats(fields[1:4], place, 3)
         nodes[whole(fields[0], place)] = made.origin + made.axes @ cartesian(kind, at, place) if moved else at
@@ -293,7 +293,7 @@ def abaqus_nodes(blocks):
     nodes = []
     for block in blocks:
         for place, fields in block.rows() if block.name == "NODE" else ():
-            if not 2 <= len(fields) <= 7:
+            if not 1 <= len(fields) <= 7:
                 raise Problem(f"{place}: {len(fields)} fields; expected a node's number and its x, y, z")
             position = [number(field or "0", place) for field in fields[1:4]]
             nodes.append((place, whole(fields[0], place), position + [0.0] * (3 - len(position))))

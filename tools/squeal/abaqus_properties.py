@@ -1,5 +1,7 @@
 """Materials, their axes, and sections of Abaqus and CalculiX."""
 
+import re
+
 import numpy as np
 from squeal.common import counted
 from squeal.deck_files import Problem, number, undefined
@@ -85,7 +87,8 @@ def read_orientations(deck):
             continue
         kind = block.options.get("SYSTEM", "RECTANGULAR").upper()
         rows = list(block.rows())
-        if kind not in ("RECTANGULAR", "CYLINDRICAL") or block.options.get("DEFINITION", "COORDINATES").upper() != "COORDINATES" or not rows:
+        if kind not in ("RECTANGULAR", "CYLINDRICAL") or block.options.get("DEFINITION", "COORDINATES").upper() != "COORDINATES" or not rows \
+                or re.match("[A-Za-z_]", "".join(rows[0][1][:1])):
             deck.note(f"*ORIENTATION {block.options.get('NAME', '')}, which is of no two points", block.place)
             continue
         place, fields = rows[0]

@@ -1,5 +1,7 @@
 """Keywords of Abaqus and CalculiX about contacts, friction, motions, loads, and the order of steps."""
 
+import re
+
 import numpy as np
 from squeal.deck_files import Problem, number, undefined, whole
 
@@ -96,6 +98,8 @@ def behaviour(block, deck):
         if not slope > 0:
             raise Problem(f"{rows[0][0]}: a slope of {slope:g}; expected one above 0")
         keys["compliance"] = 1 / slope
+    elif kind == "TIED" and keys is not None:
+        keys["tied"] = True
     elif kind != "HARD":
         deck.note(f"PRESSURE-OVERCLOSURE={kind} of *SURFACE BEHAVIOR", block.place)
 
@@ -210,8 +214,15 @@ def element_load(block, deck):
     """Pressures on faces of elements, and gravity."""
     replaced(block, deck, "pressure")
     model = deck.model
-    for place, fields in block.rows(3, "an element or a set, a type such as P1 or GRAV, and its size"):
-        kind, value = fields[1].upper(), number(fields[2], place)
+    for place, fields in block.rows(2, "an element or a set, a type such as P1 or GRAV, and its size"):
+        kind = fields[1].upper()
+        pressed = re.fullmatch(r"P(\d)", kind)
+        if kind != "GRAV" and not pressed:
+            deck.note(f"*DLOAD of type {fields[1]}", place)
+            continue
+        if len(fields) < 3:
+            raise Problem(f"{place}: *DLOAD, '{', '.join(fields)}': {len(fields)} fields; expected the size of the load behind its type")
+        value = number(fields[2], place)
         numbers = deck.elements_of(fields[0], place)
         if kind == "GRAV" and len(fields) > 5:
             axis = np.array([number(field or "0", place) for field in fields[3:6]])
@@ -220,17 +231,16 @@ def element_load(block, deck):
             model.gravity = (value * axis / np.linalg.norm(axis)).tolist()
             if not set(model.elements) <= set(numbers):
                 deck.note(f"that gravity acts on {fields[0]} alone: in a scene it acts on all", place)
-        elif kind[:1] == "P" and kind[1:].isdecimal():
-            label = f"{fields[0]}_{kind}"
-            faces = [model.faces(n)[int(kind[1:]) - 1] for n in numbers
-                     if n in model.elements and 0 < int(kind[1:]) <= len(model.faces(n)) > 1]
+        elif pressed:
+            label, side = f"{fields[0]}_{kind}", int(pressed[1])
+            faces = [model.faces(n)[side - 1] for n in numbers if n in model.elements and 0 < side <= len(model.faces(n)) > 1]
             if not faces:
                 deck.note(f"*DLOAD {kind} of {fields[0]}: no such faces of solids", place)
                 continue
             model.surfaces[label] = faces
             deck.steps.loads["pressure", label] = value
         else:
-            deck.note(f"*DLOAD of type {fields[1]}", place)
+            deck.note("*DLOAD of type GRAV without a direction", place)
 
 
 def finish(deck):
@@ -287,6 +297,9 @@ def add_contacts(deck, ends):
     model = deck.model
     nodes_of = {name: {n for face in faces for n in face} for name, faces in model.surfaces.items()}
     nodes_of |= {name: set(nodes) for name, nodes in model.node_sets.items() if name not in nodes_of}
+    tied = {name for name, keys in deck.steps.interactions.items() if keys.pop("tied", False)}
+    model.ties += [(slave, master) for slave, master, name in deck.steps.pairs if name in tied]
+    deck.steps.pairs = [pair for pair in deck.steps.pairs if pair[2] not in tied]
     for slave, master, name in deck.steps.pairs:
         keys = {"friction": 0.0, **deck.steps.interactions.get(name, {})}
         keys |= {"gap": gap} if (gap := deck.steps.gaps.get((slave.upper(), master.upper()))) else {}

@@ -135,7 +135,7 @@ def selected_nodes(words, place, deck):
     """Those that a command acts on by ALL."""
     state = deck.state
     if state.unread:
-        deck.note(f"{','.join(words)} on the nodes of {state.unread}: name them in a component and select it by CMSEL", place)
+        deck.note(f"{','.join(words).upper()} on the nodes of {state.unread}: name them in a component and select it by CMSEL", place)
         return []
     return list(deck.model.nodes) if state.nodes is None else state.nodes
 

@@ -150,7 +150,7 @@ class Tables:
         joints, at = self.joints, [float(v) for v in self.model.nodes[node]]
         rigid = [row for row in joints.rigid if row[0] == node]
         mean = [row for row in joints.mean if row[0] == node]
-        held = joints.held.get(node, set())
+        held = joints.held.get(node, set()) - joints.moved.get(node, {}).keys()  # which make_moved holds
         free = " ".join(m for m in MOTIONS if m not in held) or "none"
         free = "all" if not held else free
         mass = {"mass": joints.mass[node]} if joints.mass.get(node) else {}

@@ -56,7 +56,8 @@ def read_deck(file, size=0.0):
 def finished(model, file):
     """Parts of all solids, groups with names of their own, faces where contacts and couplings need them."""
     if not model.elements:
-        raise Problem(f"{file}: no solid and no shell elements" + (f"; left out are {'; '.join(model.notes[:3])}" if model.notes else ""))
+        told = sorted(model.notes, key=lambda note: " of type " not in note and "the cards" not in note)[:3]
+        raise Problem(f"{file}: no solid and no shell elements" + (f"; left out are {'; '.join(told)}" if told else ""))
     model.add_parts_of_the_rest("body")
     model.drop_loose_nodes()
     model.drop_idle_supports()

@@ -5,28 +5,31 @@ import re
 from collections import Counter
 
 import numpy as np
+from squeal.common import counted
 from squeal import nastran_bolts
 from squeal import nastran_joining
-from squeal.deck_files import Problem, Systems, cards_of, lines_of, nastran_nodes, number, sections_of, span, undefined, whole
+from squeal.deck_files import Problem, lines_of, number, span, undefined, whole
 from squeal.mesh_model import FLAT, MOTIONS, Model, corners_of
+from squeal.nastran_cards import Placed, Systems, cards_of, is_blank, nastran_nodes, sections_of, table_of, wholes
 from squeal.nastran_properties import note_shell_fields, read_materials, read_properties
 
 ELEMENTS = {("CHEXA", 8): "hex8", ("CHEXA", 20): "hex20", ("CPENTA", 6): "wedge6", ("CTETRA", 4): "tet4",
-            ("CTETRA", 10): "tet10", ("CQUAD4", 4): "quad4", ("CTRIA3", 3): "tri3", ("CTRIA6", 6): "tri6", ("CQUAD8", 8): "quad8"}
+            ("CTETRA", 10): "tet10", ("CQUAD4", 4): "quad4", ("CTRIA3", 3): "tri3", ("CTRIA6", 6): "tri6", ("CTRIA6", 3): "tri3", ("CQUAD8", 8): "quad8",
+            ("CQUAD8", 4): "quad4"}
 CORNERS = {"CHEXA": (8, 20), "CPENTA": (6, 15), "CTETRA": (4, 10), "CQUAD4": (4, 4), "CTRIA3": (3, 3), "CTRIA6": (6, 6),
            "CQUAD8": (8, 8), "CPYRAM": (5, 13)}
 UPPER = {"EIGRL": 4, "EIGRA": 4, "EIGR": 5}  # fields of the highest frequency
 WITHOUT_ELEMENT = {("CPENTA", 15), ("CPYRAM", 5), ("CPYRAM", 13)}
-READ = {*UPPER, "GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "PSOLID", "PSHELL", "MAT1", "MAT9", "MATORT", "SPC", "SPC1", "SPCADD",
+READ = {*UPPER, "GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "CORD1R", "CORD1C", "CORD1S", "PSOLID", "PSHELL", "MAT1", "MAT9", "MATORT", "SPC", "SPC1", "SPCADD",
         "SET1", "SET3", "PARAM", "ENDDATA", *CORNERS, *nastran_joining.READ, *nastran_bolts.READ}
 
 
 class Deck:
     """What the handlers of cards share."""
 
-    def __init__(self, file, cards):
+    def __init__(self, file, lines, cards):
         self.model, self.cards = Model(file), cards
-        self.names = names_in_comments(file)
+        self.names = names_in_comments(lines)
         self.systems, self.turned = Systems(cards), {}
         self.properties = {(card.name, card.field(2)): card for card in cards if card.name in nastran_joining.PROPERTIES}
         self.surfaces = {}  # names of SURF and SET by their numbers
@@ -38,8 +41,8 @@ class Deck:
         return line if file == str(self.model.source) else card.place
 
     def has_unread(self, beginning, number):
-        """Whether a card of such a name has this number: what is there, and is left out."""
-        return any(card.name.startswith(beginning) and card.field(2) == number for card in self.cards)
+        """Whether a card of such a name that is left out has this number."""
+        return any(card.name not in READ and card.name.startswith(beginning) and card.field(2) == number for card in self.cards)
 
     def note(self, what, card):
         self.model.notes.append(f"{what} ({self.line_of(card)})")
@@ -95,8 +98,10 @@ class Deck:
 
 
 def read_bdf(file):
-    cards = cards_of(file)
-    deck = Deck(file, cards)
+    lines = list(lines_of(file))
+    control, bulk = sections_of(lines)
+    cards = cards_of(file, bulk)
+    deck = Deck(file, lines, cards)
     model = deck.model
     labels, positions = nastran_nodes(cards)
     model.nodes = dict(zip(labels.tolist(), positions))
@@ -106,13 +111,12 @@ def read_bdf(file):
     if left_out:
         model.notes.append("the cards " + ", ".join(f"{name} ({count})" for name, count in sorted(left_out.items())))
     of_property = {}
-    for card in cards:
-        if card.name in CORNERS:
-            read_element(card, model, of_property)
+    for name, found in cards.elements.items():
+        read_elements(name, found, model, of_property)
     note_shell_fields(cards, model)
     read_materials(cards, deck)
     read_properties(cards, deck, of_property)
-    case = "\n".join(line for _, line in sections_of(file)[0])
+    case = "\n".join(line for _, line in control)
     deck.turned = turned_nodes(cards)
     read_supports(cards, case, deck)
     read_sets(cards, case, deck)
@@ -124,6 +128,37 @@ def read_bdf(file):
     nastran_bolts.read_bolts(cards, case, deck)
     model.band = max((card.number(UPPER[card.name], 0.0) for card in cards if card.name in UPPER), default=0.0)
     return model
+
+
+def read_elements(name, cards, model, of_property):
+    """Cards of one form at once, others one by one."""
+    alike = {}
+    for card in cards:
+        alike.setdefault(len(card.texts), []).append(card)
+    for of in alike.values():
+        if not read_at_once(name, of, model, of_property):
+            for card in of:
+                read_element(card, model, of_property)
+
+
+def read_at_once(name, cards, model, of_property):
+    """Whether all have as many nodes, and nothing is wrong with them."""
+    texts = table_of(cards)
+    most = CORNERS[name][1]
+    if texts is None or texts.shape[1] < 2 + most and name in ("CQUAD4", "CTRIA3"):
+        return False
+    given = ~is_blank(texts[:, : 2 + most])
+    count = int(given[0].sum())
+    if not (given == (np.arange(given.shape[1]) < count)).all() or (name, count - 2) not in ELEMENTS:
+        return False
+    table = wholes(texts[:, :count])
+    if table is None or not model.add_elements(Placed(cards), ELEMENTS[name, count - 2], table[:, [0, *range(2, count)]], "nastran"):
+        return False
+    order = np.argsort(table[:, 1], kind="stable")
+    pids, first = np.unique(table[order, 1], return_index=True)
+    for pid, numbers in zip(pids.tolist(), np.split(table[order, 0], first[1:])):
+        of_property.setdefault(pid, []).extend(numbers.tolist())
+    return True
 
 
 def read_element(card, model, of_property):
@@ -149,10 +184,10 @@ def read_element(card, model, of_property):
 KEYWORDS = {"PROP": "PROP", "CONTACTSURF": "SURF", "SET": "SET"}
 
 
-def names_in_comments(file):
+def names_in_comments(lines):
     """Names by keyword and number, as HyperMesh, ANSA and Simcenter write them into comments."""
     names = {}
-    for _, line in lines_of(file):
+    for _, line in lines:
         if line[:1] == "P":
             if (found := re.match(r"P(?:SOLID|SHELL)\W+(\d+)", line)) and "next" in names:
                 names["PROP", found[1]] = names.pop("next")
@@ -204,7 +239,7 @@ def read_supports(cards, case, deck):
     """Of each set number and its motions, a set of nodes; the motions that GRID holds too. Nodes of solids have no
     rotations; nodes that no element has are held as reference points."""
     model = deck.model
-    default = next((card.field(8) for card in cards if card.name == "GRDSET"), "")
+    default = cards.default(8)
     applied = applied_supports(cards, case, model)
     held = {}
     for card in cards:
@@ -217,11 +252,15 @@ def read_supports(cards, case, deck):
             for i in (3, 6):
                 if card.field(i):
                     held.setdefault((card.field(2), card.field(i + 1), card.number(i + 2, 0.0)), []).append(card.whole(i))
-        elif card.name == "GRID" and (card.field(8) or default).strip("0"):
+    for card in cards.odd_grids:
+        if (card.field(8) or default).strip("0"):
             held.setdefault(("grid", card.field(8) or default, 0.0), []).append(card.whole(2))
     used = {node for _, nodes in model.elements.values() for node in nodes}
     turning, idle = model.nodes_with_rotations(), 0
     for (number, digits, value), nodes in held.items():
+        if not digits.strip("0"):  # of scalar points and temperatures
+            model.notes.append(f"SPC {number} of {counted(len(nodes), 'node')} without motions from 1 to 6")
+            continue
         if not digits.isdecimal() or not set(digits) <= set("123456"):
             raise Problem(f"{model.source}: SPC {number} holds '{digits}'; expected digits from 1 to 6")
         motions = [MOTIONS[int(digit) - 1] for digit in sorted(set(digits))]
@@ -285,10 +324,10 @@ def joined(numbers):
 def turned_nodes(cards):
     """Number of the system and place, of the nodes whose motions are along other axes than the basic ones."""
     systems = Systems(cards)
-    default = next((card.field(7) for card in cards if card.name == "GRDSET"), "")
+    default = cards.default(7)
     found = {}
-    for card in cards:
-        if card.name == "GRID" and (card.field(7) or default):
+    for card in cards.odd_grids:
+        if card.field(7) or default:
             system = whole(card.field(7) or default, card.place)
             if system not in (-1, 0) and not systems.are_basic_axes(system, card.place):
                 found[card.whole(2)] = (system, card.place)
@@ -298,7 +337,7 @@ def turned_nodes(cards):
 def read_sets(cards, case, deck):
     """SET1 is of nodes, SET and SET3 say what they are of; the case control's SET may be of nodes, elements or others."""
     model = deck.model
-    largest = max(*model.nodes, *model.elements, 0)
+    largest = max(max(model.nodes), max(model.elements, default=0))
     for card in cards:
         name = deck.names.get(("SET", card.field(2)), f"set_{card.field(2)}")
         if card.name == "SET1":

@@ -112,7 +112,7 @@ def bushing(card, deck):
         keys |= {"axis_1": frame[:, 0].tolist(), "axis_2": frame[:, 1].tolist()}
     if card.field(10) or card.field(11):
         deck.note(f"the place of the spring of CBUSH {card.field(2)}: it is in the middle", card)
-    if any(any(keys.get(key, ())) for key in ("stiffness", "damping")):
+    if "locked" in keys or any(any(keys.get(key, ())) for key in ("stiffness", "damping")):
         deck.model.joints.connectors.append((a, b, keys, deck.line_of(card)))
 
 
@@ -124,7 +124,10 @@ def constants_of(found, deck):
         if word and not word[0].isdigit() and word[0] not in "+-." and word not in ("K", "B", "GE"):
             deck.note(f"{word} of PBUSH {found.field(2)}", found)
         if word in ("K", "B", "GE"):
-            values = [deck.number(text or "0", found) for text in (fields[i : i + 6] + [""] * 6)[:6]]
+            texts = (fields[i : i + 6] + [""] * 6)[:6]
+            values = [deck.number(text if text not in ("", "RIGID") else "0", found) for text in texts]
+            if "RIGID" in texts:
+                keys["locked"] = joined([motion for motion, text in zip(MOTIONS, texts) if text == "RIGID"])
             if word == "GE":
                 keys |= {"loss_factor": values[0]} if values[0] else {}
             else:
@@ -180,7 +183,8 @@ def section_of(card):
         if min(area, first, second, torsion) > 0:
             return {"area": area, "bending": [first, second], "torsion": torsion}
         return None
-    kind, sizes = card.field(5).upper(), [card.number(i, 0.0) for i in range(10, 14)]
+    kind = card.field(5).upper()
+    sizes = [card.number(10 + i, 0.0) for i in range(SIZES.get(kind, 0))]
     if kind == "ROD" and sizes[0] > 0:
         return {"diameter": 2 * sizes[0], "shear_factor": 0.9}
     if kind == "TUBE" and sizes[0] > sizes[1] >= 0:
@@ -231,7 +235,6 @@ def gravity(card, deck, factor):
     deck.model.gravity = (card.number(4, 0.0) * factor * direction).tolist()
 
 
-OTHER_LOADS = ("FORCE", "MOMENT", "PLOAD", "RFORCE", "ACCEL", "TEMP", "SPCD", "DEFORM", "SLOAD")  # whose sets are there, and not read
 LOADS = {"FORCE": force, "MOMENT": force, "PLOAD4": pressure, "GRAV": gravity}
 
 
@@ -244,14 +247,14 @@ def read_loads(cards, case, deck):
         deck.model.notes.append(f"LOAD {', '.join(map(str, chosen[:-1]))} of other subcases: the loads are those of LOAD {chosen[-1]}")
     factors = {}
     for number in chosen:
-        if number not in known and number not in sums and not any(deck.has_unread(name, str(number)) for name in OTHER_LOADS):
+        if number not in known and number not in sums and not deck.has_unread("", str(number)):
             raise undefined(deck.model.source, "case control, LOAD: the set", number, [*sums, *known])
     for number in chosen[-1:] or [n for n in known if not sums]:
         if number in sums:
             card = sums[number]
             overall = card.number(3, 1.0)
             for text in card.fields[3::2]:
-                if text and whole(text, card.place) not in known and not any(deck.has_unread(name, text) for name in OTHER_LOADS):
+                if text and whole(text, card.place) not in known and not deck.has_unread("", text):
                     raise undefined(card.place, "LOAD: the set", text, known)
             for i in range(4, 2 + len(card.fields) - 1, 2):
                 if card.field(i + 1):
@@ -335,6 +338,7 @@ HANDLERS = {"RBE2": rigid, "RBAR": rigid_bar, "RBE3": mean, "CELAS1": scalar, "C
             "CBUSH": bushing, "CONM2": concentrated_mass, "CBAR": bar, "CBEAM": bar, "SURF": surface, "CONTACT": contact,
             "TIE": contact}
 BAR_FIELDS = {"the released motions": (10, 11), "the offsets": range(12, 18)}
+SIZES = {"ROD": 1, "TUBE": 2, "BAR": 2}  # of sections that are read
 BAR_PROPERTIES = ("PBAR", "PBARL", "PBEAM", "PBEAML")
 PROPERTIES = {"PELAS", "PDAMP", "PBUSH", "PBAR", "PBARL", "PBEAM", "PBEAML", "PCONT"}
 READ = {*HANDLERS, *PROPERTIES, *LOADS, "LOAD", "EIGC", "SET"}

@@ -5,7 +5,8 @@ import struct
 
 import numpy as np
 import scipy.sparse as sparse
-from squeal.deck_files import Problem, fields_of, number, whole
+from squeal.deck_files import Problem, number, whole
+from squeal.nastran_cards import fields_of
 from squeal.vendor_matrices import Labelled, both_triangles, chosen
 
 

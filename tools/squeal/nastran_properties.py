@@ -11,7 +11,7 @@ SHELL_FIELDS = {"CQUAD4": {"ZOFFS": (9,), "T1 to T4": (12, 13, 14, 15)},
 def note_shell_fields(cards, model):
     for name, fields in SHELL_FIELDS.items():
         for what, places in fields.items():
-            count = sum(any(card.number(i, 0.0) for i in places) for card in cards if card.name == name)
+            count = sum(any(card.number(i, 0.0) for i in places) for card in cards.elements[name])
             if count:
                 model.notes.append(f"{what} of {count} {name}")
 

@@ -11,7 +11,8 @@ import re
 import numpy as np
 import scipy.sparse as sparse
 from squeal.abaqus_nodes import abaqus_nodes
-from squeal.deck_files import Problem, Systems, blocks_of, cards_of, nastran_nodes, number, whole
+from squeal.deck_files import Problem, blocks_of, number, whole
+from squeal.nastran_cards import Systems, cards_of, nastran_nodes
 
 COLUMNS = ("rotor", "stator", "nx", "ny", "nz", "area", "gap")
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
@@ -53,11 +54,8 @@ def read_nodes(file):
 
 def turned_axes(cards, positions):
     """Of each GRID with a displacement system (CD) that is not along x, y and z: its axes at the node, in columns."""
-    systems, found = Systems(cards), {}
-    default = next((card.field(7) for card in cards if card.name == "GRDSET"), "")
-    for card in cards:
-        if card.name != "GRID":
-            continue
+    systems, found, default = Systems(cards), {}, cards.default(7)
+    for card in cards.odd_grids:
         place, node = f"{card.place}, GRID {card.field(2)}", card.whole(2)
         system = whole(card.field(7) or default or "0", place)
         if system > 0 and not systems.are_basic_axes(system, place):  # -1 is a point of a fluid

@@ -1,6 +1,8 @@
 """The scene of a mesh_model.Model. What a scene needs and the deck does not say is a key with the text FILL IN, which squeal
 refuses at its line."""
 
+import re
+
 from squeal.deck_joints import MOTIONS, Tables
 from squeal.mesh_model import KINDS
 
@@ -11,6 +13,7 @@ UNITS = {"at": (1, 0), "mass": (-1, 1), "inertia": (1, 1), "stiffness": (-1, 1),
          "torsion": (4, 0), "diameter": (1, 0), "thickness": (1, 0), "displacement": (1, 0), "decay_speed": (1, 0),
          "reach": (1, 0), "gap": (1, 0), "gravity": (1, 0)}
 SINGLE = ("friction", "modes", "damping", "estimate", "mesh")  # tables that there is one of
+ALIKE = 5  # notes that differ by numbers alone, of which all are shown
 BAND = 20000  # [Hz] of a scene that gives none
 TURNING = ("stiffness", "damping")  # whose last three of six have the length twice more
 
@@ -57,8 +60,7 @@ def skeleton(model, mesh, length, force):
         writer.lines.append(f"gravity = {writer.value('gravity', model.gravity)}")
     writer.lines += ["", "[mesh]", f"file = {text(mesh)}"]
     writer.lines += [f"scale = {length!r}"] if length != 1 else []
-    for note in model.notes:
-        writer.lines += ["", f"# Not taken over: {note}"] if note == model.notes[0] else [f"# Not taken over: {note}"]
+    writer.lines += ["", *(f"# Not taken over: {note}" for note in condensed(model.notes))] if model.notes else []
     groups = [*model.surfaces, *model.node_sets]
     writer.lines += ["", "# Groups of the mesh: " + (", ".join(groups) or "none beside the parts")]
     for name, part in model.parts.items():
@@ -84,6 +86,18 @@ def skeleton(model, mesh, length, force):
     gaps = any("FILL IN [" in line for line in writer.lines)
     head = f"# Made of {model.source.name}." + (" squeal refuses lines with FILL IN: the deck does not say what they need." if gaps else "")
     return "\n".join([head, *writer.lines, ""])
+
+
+def condensed(notes):
+    """Of notes that differ by numbers alone the first ones, and how many there are."""
+    alike = {}
+    for note in notes:
+        alike.setdefault(re.sub(r"\d+", "#", note), []).append(note)
+    shown = []
+    for found in alike.values():
+        few = found if len(found) <= ALIKE else found[: ALIKE - 1]
+        shown += few + ([f"{len(found) - len(few)} others like the last one"] if len(few) < len(found) else [])
+    return shown
 
 
 def is_driven(keys):
