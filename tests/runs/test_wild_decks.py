@@ -195,3 +195,43 @@ def test_notes_that_are_alike_are_few(tmp_path):
     bars = "PBARL,5,1,,BAR\n,.1,.2\n" + "".join(f"CBAR,{n},5,1,101,1.,0.,0.\n" for n in range(20, 40))
     left_out = converted(tmp_path, "BEGIN BULK\n" + GRIDS + bars, "deck.bdf")[1]
     assert len(left_out) == 5 and left_out[-1] == "16 others like the last one"
+
+
+def test_a_part_has_elements_of_one_order(tmp_path, squeal):
+    """A set of linear and of quadratic bricks is two parts."""
+    at = [(x, y, z) for z in (5, 6) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    mids = [tuple(np.add(at[a], at[b]) / 2) for a, b in ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))]
+    more = "*NODE\n" + "".join(f"{i}, {x}, {y}, {z}\n" for i, (x, y, z) in enumerate([*at, *mids], 201))
+    more += "*ELEMENT, TYPE=C3D20, ELSET=high\n9, " + ", ".join(map(str, range(201, 212))) + ",\n" + ", ".join(map(str, range(212, 221))) + "\n"
+    more += "*ELSET, ELSET=lid\n9,\n*SURFACE, NAME=lid\nlid, S2\n"
+    scene, left_out = converted(tmp_path, BRICKS + more)
+    assert [part["name"] for part in scene["part"]] == ["low", "high", "high_linear"]
+    assert any("1 element of high are linear" in note for note in left_out)
+    assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
+
+
+@pytest.mark.parametrize("motions, expected, lost", [
+    ("1, 3, 0", [("base_off_axis", "x y z"), ("base_on_axis", "x y z")], 0), ("1, 1, 0.001", [("base_off_axis", "x")], 1)])
+def test_nodes_on_the_axis_of_a_cylinder(tmp_path, squeal, motions, expected, lost):
+    """Node 1 is on it: no direction is radial there; what holds all across the axis holds it as well."""
+    deck = BRICKS.replace("*BOUNDARY\nbase, 1, 3\n", f"*TRANSFORM, NSET=base, TYPE=C\n0,0,0, 0,0,1\n*BOUNDARY\nbase, {motions}\n")
+    scene, left_out = converted(tmp_path, deck)
+    assert [(support["on"], support["fixed"]) for support in scene["support"]] == expected
+    assert len(left_out) == lost and all("on the axis of its cylinder" in note for note in left_out)
+    assert squeal(tmp_path / "out" / "scene.toml", "--dry-run", ranks=1).code == 0
+
+
+def test_sides_without_faces_are_gaps(tmp_path):
+    scene, _ = converted(tmp_path, BRICKS + "*SURFACE, NAME=dots, TYPE=NODE\n9,\n10,\n*SURFACE INTERACTION, NAME=i\n*CONTACT PAIR, INTERACTION=i\ndots, low_top\n")
+    assert scene["contact"][0]["stator"] == "FILL IN [a surface]: dots of the deck covers no faces of its elements"
+
+
+def test_ties_of_cyclic_symmetry_are_none(tmp_path):
+    scene, left_out = converted(tmp_path, BRICKS + "*TIE, CYCLIC SYMMETRY, NAME=t\nhigh_bottom, low_top\n")
+    assert "tie" not in scene and left_out[0].startswith("*TIE, CYCLIC SYMMETRY")
+
+
+def test_a_mesh_of_skins_alone_is_refused(tmp_path):
+    (tmp_path / "deck.inp").write_text("*NODE\n1, 0., 0.\n2, 1., 0.\n3, 0., 1.\n*ELEMENT, TYPE=CPS3, ELSET=e\n1, 1,2,3\n")
+    with pytest.raises(TOOL.Problem, match="no solid elements, and no shells with a property"):
+        TOOL.read_deck(tmp_path / "deck.inp")

@@ -110,6 +110,9 @@ def pairs(block, deck):
     laws = [other.options.get("NAME", "") for other in deck.blocks if other.name == "SURFACE INTERACTION"]
     if law and law not in map(str.upper, laws):
         raise undefined(block.place, f"*{block.name}: the interaction", law, laws)
+    if cyclic := [key for key in ("CYCLIC SYMMETRY", "MULTISTAGE", "FLUID PERIODIC", "FLUID CYCLIC") if key in block.options]:
+        deck.note(f"*TIE, {cyclic[0]}", block.place)
+        return
     for place, fields in block.rows(1, "the slave surface and the master surface"):
         names = [deck.face_group(name, place, f"*{block.name}: the surface") for name in fields[:2]]
         if len(fields) < 2:
@@ -347,6 +350,6 @@ OPTIONS = {"FREQUENCY": "EIGENSOLVER,NORMALIZATION,SOLVER,STORAGE,GLOBAL,CYCMPC,
            "COMPLEX FREQUENCY": "FRICTION DAMPING,CORIOLIS,FLUTTER,PROPERTY EVALUATION,LEFT EIGENVECTORS",
            "SURFACE INTERACTION": "NAME,USER,PAD THICKNESS", "CHANGE FRICTION": "INTERACTION,RESET",
            "FRICTION": "SLIP TOLERANCE,EXPONENTIAL DECAY,ROUGH,LAGRANGE,ELASTIC SLIP",
-           "SURFACE BEHAVIOR": "PRESSURE-OVERCLOSURE,AUGMENTED LAGRANGE,PENALTY,DIRECT", "TIE": "NAME,ADJUST,TYPE,CONSTRAINT RATIO,NO ROTATION",
+           "SURFACE BEHAVIOR": "PRESSURE-OVERCLOSURE,AUGMENTED LAGRANGE,PENALTY,DIRECT", "TIE": "NAME,ADJUST,TYPE,CONSTRAINT RATIO,NO ROTATION,CYCLIC SYMMETRY,MULTISTAGE,FLUID PERIODIC,FLUID CYCLIC",
            "CONTACT PAIR": "INTERACTION,TYPE,SMALL SLIDING,TIED,MECHANICAL CONSTRAINT,CPSET,TRACKING,SUPPLEMENTARY CONSTRAINTS",
            "CLEARANCE": "SLAVE,MASTER,VALUE", "MOTION": "TRANSLATION,ROTATION,TYPE", "CLOAD": "OP", "DSLOAD": "OP", "DLOAD": "OP"}

@@ -2,9 +2,12 @@
 
 import re
 
+import numpy as np
 from squeal.abaqus_deck import read_inp
 from squeal.ansys_deck import read_cdb
+from squeal.common import counted
 from squeal.deck_files import Problem
+from squeal.mesh_model import FLAT, KINDS, Part
 from squeal.nastran_deck import read_bdf
 from squeal.step_deck import read_step
 from squeal.unv_deck import read_unv
@@ -64,6 +67,63 @@ def finished(model, file):
     model.separate_names()
     model.name_faces_of_node_sets()
     model.drop_ties_without_faces()
-    if not model.parts and not any(model.surfaces.values()):
+    split_orders(model)
+    gap_contacts_without_faces(model)
+    turn_supports_on_axes(model)
+    if not model.parts:
         raise Problem(f"{file}: no solid elements, and no shells with a property")
     return model
+
+
+def split_orders(model):
+    """A part has elements of one order; those of the other are a part of their own."""
+    for name, part in list(model.parts.items()):
+        linear = [n for n in part.elements if len(model.elements[n][1]) == len_of_corners(model, n)]
+        if 0 < len(linear) < len(part.elements):
+            shown, taken = model.unused(f"{name}_linear"), set(linear)
+            model.notes.append(f"that {counted(len(linear), 'element')} of {name} are linear beside quadratic ones: they are the part {shown}")
+            model.parts[shown] = Part(linear, part.material, part.thickness)
+            model.parts[shown].axes = part.axes
+            part.elements = [n for n in part.elements if n not in taken]
+
+
+def len_of_corners(model, number):
+    kind = model.elements[number][0]
+    return (KINDS.get(kind) or FLAT[kind])[1]
+
+
+def gap_contacts_without_faces(model):
+    """A side that is a set of nodes without faces is a gap that is to be filled."""
+    for i, (*sides, keys) in enumerate(model.contacts):
+        shown = [name if name in model.surfaces or name.startswith("FILL IN") else
+                 f"FILL IN [a surface]: {name} of the deck covers no faces of its elements" for name in sides]
+        model.contacts[i] = (*shown, keys)
+
+
+def turn_supports_on_axes(model):
+    """Nodes on the axis of a cylinder have no radial direction: they are held along the axis, and across it where all is held."""
+    for name, motions, keys in list(model.supports):
+        if "cylinder" not in keys:
+            continue
+        axis, centre = (np.array(keys["cylinder"][key], float) for key in ("axis", "centre"))
+        axis /= np.linalg.norm(axis)
+        nodes = model.node_sets.get(name) or sorted({n for face in model.surfaces[name] for n in face})
+        arms = np.array([model.nodes[n] for n in nodes]) - centre
+        near = np.linalg.norm(np.cross(arms, axis), axis=1) <= 1e-9 * max(1e-300, np.abs(arms).max())
+        if not near.any():
+            continue
+        pairs = [({"x", "y"}, keys.get("displacement", ())), ({"rx", "ry"}, keys.get("rotation", ()))]
+        lost = [m for m in motions for pair, moved in pairs if m in pair and (not pair <= set(motions) or any(moved[:2]))]
+        at = [n for n, on in zip(nodes, near) if on]
+        if lost:
+            model.notes.append(f"the motions {' '.join(lost)} of {counted(len(at), 'node')} of {name} on the axis of its cylinder, where none is radial")
+        across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+        across /= np.linalg.norm(across)
+        others = {key: of for key, of in keys.items() if key != "cylinder"} | {"axis_1": across.tolist(), "axis_2": np.cross(axis, across).tolist()}
+        for title, of, held, more in ((name + "_off_axis", [n for n, on in zip(nodes, near) if not on], motions, keys),
+                                      (name + "_on_axis", at, [m for m in motions if m not in lost], others)):
+            if of and held:
+                shown = model.unused(title)
+                model.node_sets[shown] = of
+                model.supports.append((shown, held, more))
+        model.supports.remove((name, motions, keys))
