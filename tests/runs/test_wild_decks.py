@@ -1,11 +1,17 @@
 """tools/mesh: habits of decks as preprocessors and releases write them, each in a small deck of our own."""
 
+import random
 import re
+import tomllib
 
 import numpy as np
 import pytest
+from conftest import ROOT
 from test_decks import AT, BRICK_ROWS, BRICKS, GRIDS, TOOL, cdb, converted
+from fuzz_cases import spoil_field, spoil_lines  # whose folder load_tool has made known
+from fuzz_decks import DECKS
 
+CORNER = ROOT / "inputs/corner/scene.toml"
 HEAD = "/batch\n*DIM,_dir,string,248\n_dir(1) = 'D:\\work, and more\\'\n/com,--- Data in MKS units\n/prep7\nSHPP,OFF,,NOWARN\netcon,set\n"
 BODIES = ('/com,*********** Elements for Body 1 "SYS\\Disc" ***********\net,1,185\neblock,19,solid,,1\n(19i9)\n{low}-1\n'
           '/com,*********** Elements for Body 2 "Pad, outer" ***********\net,2,185\neblock,19,solid,,1\n(19i9)\n{high}-1\n')
@@ -235,3 +241,52 @@ def test_a_mesh_of_skins_alone_is_refused(tmp_path):
     (tmp_path / "deck.inp").write_text("*NODE\n1, 0., 0.\n2, 1., 0.\n3, 0., 1.\n*ELEMENT, TYPE=CPS3, ELSET=e\n1, 1,2,3\n")
     with pytest.raises(TOOL.Problem, match="no solid elements, and no shells with a property"):
         TOOL.read_deck(tmp_path / "deck.inp")
+
+
+def test_the_corner_loses_nothing(tmp_path):
+    """Its scene as a deck and back has the same tables: laws of friction and damping stand where they act."""
+    source = CORNER.read_text()
+    (tmp_path / "scene.toml").write_text(re.sub(r"^size = \d+", "size = 3000", source, flags=re.M))
+    (tmp_path / "brake.geo").write_bytes((CORNER.parent / "brake.geo").read_bytes())
+    assert TOOL.write_deck(tmp_path / "scene.toml", tmp_path / "corner.inp") == []
+    given, (scene, left_out) = tomllib.loads(source), converted(tmp_path, (tmp_path / "corner.inp").read_text())
+    assert left_out == []
+    for contact in given["contact"]:
+        contact.setdefault("friction", given["friction"]["coefficient"])
+    given["step"] = [{**step, "name": step["name"].replace(",", "")} for step in given["step"]]
+    given["part"] = [{**part, **given["damping"]} for part in given["part"]]
+    for table in ("part", "support", "tie", "rigid_body", "spring", "force", "pressure", "step", "contact", "modes"):
+        assert plain(scene[table]) == plain(given[table]), table
+
+
+def plain(value):
+    """Directions as numbers, and what a table has unless it says otherwise."""
+    if isinstance(value, list):
+        return [plain(of) for of in value]
+    if not isinstance(value, dict):
+        return {"z": [0, 0, 1]}.get(value, value) if isinstance(value, str) else value
+    if "rate" in value:
+        return {"centre": [0, 0, 0], **value, "axis": plain(value["axis"])}
+    return {key: of if key == "direction" else plain(of) for key, of in value.items()}
+
+
+def test_arrays_of_the_old_vtk_format_are_groups(tmp_path):
+    pytest.importorskip("meshio")
+    (tmp_path / "deck.vtk").write_text(DECKS["deck.vtk"])
+    assert list(TOOL.read_deck(tmp_path / "deck.vtk").parts) == ["part_1", "part_2"]
+
+
+@pytest.mark.parametrize("name", list(DECKS))
+def test_spoilt_decks_get_one_message(tmp_path, name):
+    """A few of what tools/fuzz makes of each deck: read, or refused by one sentence."""
+    for seed in range(40):
+        text, source = DECKS[name], random.Random(seed)
+        for _ in range(source.randint(1, 3)):
+            text = (spoil_field if source.random() < 0.6 else spoil_lines)(text, source)
+        (tmp_path / name).write_text(text, errors="replace")
+        try:
+            model = TOOL.read_deck(tmp_path / name)
+            TOOL.skeleton(model, "deck.msh", 1.0, 1.0)
+            TOOL.write_msh(model, tmp_path / "deck.msh")
+        except (TOOL.Problem, OSError) as problem:
+            assert "\n" not in str(problem)

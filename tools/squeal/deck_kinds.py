@@ -59,8 +59,7 @@ def read_deck(file, size=0.0):
 def finished(model, file):
     """Parts of all solids, groups with names of their own, faces where contacts and couplings need them."""
     if not model.elements:
-        told = sorted(model.notes, key=lambda note: " of type " not in note and "the cards" not in note)[:3]
-        raise Problem(f"{file}: no solid and no shell elements" + (f"; left out are {'; '.join(told)}" if told else ""))
+        raise Problem(f"{file}: no solid and no shell elements{told(model)}")
     model.add_parts_of_the_rest("body")
     model.drop_loose_nodes()
     model.drop_idle_supports()
@@ -71,8 +70,14 @@ def finished(model, file):
     gap_contacts_without_faces(model)
     turn_supports_on_axes(model)
     if not model.parts:
-        raise Problem(f"{file}: no solid elements, and no shells with a property")
+        raise Problem(f"{file}: no solid elements, and no shells with a property{told(model)}")
     return model
+
+
+def told(model):
+    """What was left out, elements first."""
+    notes = sorted(model.notes, key=lambda note: " of type " not in note and "the cards" not in note)[:3]
+    return f"; left out are {'; '.join(notes)}" if notes else ""
 
 
 def split_orders(model):

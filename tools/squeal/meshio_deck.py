@@ -75,6 +75,7 @@ def groups_of(mesh):
         names.setdefault("gmsh:physical", {}).setdefault(int(tag), []).append(name)
     for key, blocks in mesh.cell_data.items():
         arrays = [np.asarray(values) for values in blocks]
+        arrays = [values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values for values in arrays]  # as of the old .vtk
         if any(values.ndim != 1 or values.dtype.kind not in "iu" for values in arrays) or key == "gmsh:geometrical":
             continue
         tags = np.unique(np.concatenate(arrays)) if arrays else []
