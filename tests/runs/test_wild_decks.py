@@ -117,6 +117,16 @@ def test_keywords_of_calculix_that_no_scene_has_are_said(tmp_path, text, notes):
     assert sorted(re.sub(r" \(line \d+\)", "", note) for note in converted(tmp_path, BRICKS + text)[1]) == sorted(notes)
 
 
+def test_habits_of_abaqus_cae(tmp_path):
+    """Gravity on a blank is on all; a set may name its node twice; a velocity holds nothing."""
+    text = ("*Nset, nset=ref\n100,\n*Nset, nset=ref, internal\n100,\n*Coupling, constraint name=c, ref node=ref, surface=high_top\n*Kinematic\n"
+            "*Boundary, type=VELOCITY\nref, 3, 3, 5.\n*Boundary, type=DISPLACEMENT\nref, 1, 1\n*Dload\n, GRAV, 9.8, 0., 0., -1.\n")
+    scene, left_out = converted(tmp_path, BRICKS + text)
+    assert scene["gravity"] == [0, 0, -9.8] and scene["rigid_body"][0]["free"] == "y z rx ry rz"
+    assert scene["support"] == [{"on": "base", "fixed": "x y z"}]
+    assert [note.partition(" (")[0] for note in left_out] == ["TYPE=VELOCITY of *BOUNDARY"]
+
+
 @pytest.mark.parametrize("text, table, expected", [
     ("*coupling,surface=high_top,refnode=100,constraintname=load\n*distributing\n1,6\n", "coupling", [{"name": "load", "on": "high_top", "at": [0.5, 0.5, 3]}]),
     ("*ELEMENT, TYPE=DCOUP3D, ELSET=c\n9, 100\n*DISTRIBUTING COUPLING, ELSET=c\n13, 1.\n14, 1.\n", "coupling",
@@ -131,6 +141,18 @@ def test_spellings_and_names_of_calculix(tmp_path, text, table, expected):
     scene, left_out = converted(tmp_path, BRICKS + text)
     assert scene[table] == expected and "contact" not in scene
     assert all("it is lid_surface" in note for note in left_out)
+
+
+@pytest.mark.parametrize("rows, keys, left_out", [
+    (".3, , , 20.\n.28, , , 200.\n.25, , , 400.\n", {"friction": 0.3}, ["2 of the 3 lines of *FRICTION, of other pressures or temperatures"]),
+    (".3, 0., , 20.\n.2, 1., , 20.\n.1, 0., , 90.\n", {"friction": 0.3, "factor_at_speed": [[0, 1], [1, pytest.approx(2 / 3)]]},
+     ["1 of the 3 lines of *FRICTION, of other pressures or temperatures"]),
+])
+def test_friction_by_temperature(tmp_path, rows, keys, left_out):
+    text = f"*SURFACE INTERACTION, NAME=i\n*FRICTION\n{rows}*CONTACT PAIR, INTERACTION=i\nhigh_bottom, low_top\n"
+    scene, notes = converted(tmp_path, BRICKS + text)
+    assert {key: scene["contact"][0].get(key) for key in keys} == keys and ("factor_at_speed" in scene["contact"][0]) == ("factor_at_speed" in keys)
+    assert [note.partition(" (")[0] for note in notes] == left_out
 
 
 def test_coordinates_that_are_not_given_are_zero(tmp_path):

@@ -117,6 +117,9 @@ class Deck:
         return known[text.upper()]
 
     def elements_of(self, text, place):
+        """By number or set; a blank is the whole model, as of gravity in decks of Abaqus/CAE."""
+        if not text:
+            return list(self.model.elements)
         return [int(text)] if text.isdecimal() else self.elements.sets.get(text, place, "the element set")
 
 
@@ -178,7 +181,7 @@ def note_what_is_left_out(deck):
             near = [] if block.name in OTHERS else difflib.get_close_matches(block.name, READ, 1, 0.85)
             found.setdefault(f"*{block.name}" + (f", is it *{near[0]}?" if near else ""), []).append(block.place)
         for key, value in block.options.items() if block.name in OPTIONS else ():
-            if key not in OPTIONS[block.name].split(",") and f"{key}={value}".upper() not in ("OFFSET=SMID", "OP=MOD"):
+            if key not in OPTIONS[block.name].split(",") and f"{key}={value}".upper() not in ("OFFSET=SMID", "OP=MOD", "TYPE=DISPLACEMENT"):
                 found.setdefault(f"{key}{'=' if value else ''}{value} of *{block.name}", []).append(block.place)
     for what, places in found.items():
         times = f"{len(places)} times, first in " if len(places) > 1 else ""
@@ -322,8 +325,8 @@ def read_boundaries(deck):
     model, nodes, turned = deck.model, deck.nodes, turned_nodes(deck)
     held, moved, frames = {}, {}, {}
     for block in deck.blocks:
-        if block.name != "BOUNDARY" or "FIXED" in block.options:
-            continue
+        if block.name != "BOUNDARY" or "FIXED" in block.options or block.options.get("TYPE", "DISPLACEMENT").upper() != "DISPLACEMENT":
+            continue  # a velocity or an acceleration holds nothing, and is told by its option
         for place, fields in block.rows(2, "a node or a set, and a motion from 1 to 6 or a word such as ENCASTRE"):
             name = fields[0]
             if name.isdecimal():

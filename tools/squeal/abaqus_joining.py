@@ -11,7 +11,7 @@ ALL = " ".join(MOTIONS)
 
 
 def one_node(text, place, deck):
-    numbers = deck.nodes_of(text, place)
+    numbers = list(dict.fromkeys(deck.nodes_of(text, place)))  # a set may name its node twice
     if len(numbers) != 1:
         raise Problem(f"{place}: '{text}' has {len(numbers)} nodes; expected one, or its number")
     return numbers[0]

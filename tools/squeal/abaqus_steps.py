@@ -81,9 +81,10 @@ def friction(block, deck):
         keys |= {"static_coefficient": first[0], "decay_speed": 1 / first[2]} if first[2] > 0 else {}
     elif len(rows) > 1 and first[0] > 0:
         keys["friction"] = first[0]
-        keys["factor_at_speed"] = [(of[1] if len(of) > 1 else 0.0, of[0] / first[0]) for _, of in rows]
-        if any(any(of[2:]) for _, of in rows):
-            deck.note("*FRICTION by pressure or temperature: its lines are taken for speeds", block.place)
+        at = [(of[1] if len(of) > 1 else 0.0, of[0] / first[0]) for _, of in rows if of[2:] == first[2:]]  # at one pressure and temperature
+        keys |= {"factor_at_speed": at} if len(at) > 1 else {}
+        if len(at) < len(rows):
+            deck.note(f"{len(rows) - len(at)} of the {len(rows)} lines of *FRICTION, of other pressures or temperatures", block.place)
     else:
         keys["friction"] = first[0]
         if len(first) > 1 and first[1] > 0 and "ANISOTROPIC" not in block.options:
