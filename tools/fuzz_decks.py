@@ -300,7 +300,7 @@ $HMNAME COMP                   1"low" 1 "low" 4
     small("CQUAD8", 3, 3, 13, 14, 15, 16), small("PSOLID", 1, 1), small("PSOLID", 2, 1), small("PSHELL", 3, 1, ".1", 1),
     small("MAT1", 1, "2.+11", "", ".25", "7800."), small("SPC1", 1, 123, 1, "THRU", 4), small("SPC", 1, 100, 0, "0.0"),
     small("PBUSH", 4, "K", "RIGID", "2.0"), small("CBUSH", 11, 4, 101, 102), small("PBEAML", 5, 1, "", "ROD"), small("+", ".1", "", "YES", ".5"),
-    small("CBEAM", 12, 5, 101, 102, "0.0", "1.0", "0.0"), small("QVOL", 2, "5.0", 1, 1), small("FORCE", 2, 13, 0, "1.0", "1.0", "0.0", "0.0"),
+    small("CBEAM", 12, 5, 101, 102, "0.0", "1.0", "0.0"), small("QVOL", 2, "5.0", 1, 1), small("BSURFS", 1, "", "", "", 1, 5, 6, 7), small("BSURF", 2, 3), small("BCTSET", 9, 2, 1, ".4"), small("FORCE", 2, 13, 0, "1.0", "1.0", "0.0", "0.0"),
     small("RBE3", 8, "", 101, 123, "1.0", 123, 9), small("+", 10, 11))) + "ENDDATA\n"
 
 

@@ -183,11 +183,34 @@ def test_habits_of_bulk_data(tmp_path, head, text, notes):
 
 def test_rigid_bushings_quadratic_shells_and_sections_by_stations(tmp_path):
     more = ("PBUSH,4,K,RIGID,2.,,,,RIGID\nCBUSH,11,4,100,101,1.,0.,0.\nPBEAML,5,1,,ROD\n,.1,,YES,.5,.1\nCBEAM,12,5,100,101,1.,0.,0.\n"
-            "PSHELL,9,1,.01,1\nGRID,30,,3.,0.,0.\nGRID,31,,4.,0.,0.\nGRID,32,,4.,1.,0.\nGRID,33,,3.,1.,0.\nCQUAD8,20,9,30,31,32,33\nCTRIA6,21,9,30,31,32\n")
+            "PSHELL,9,1,.01,1\nGRID,30,,3.,0.,0.\nGRID,31,,4.,0.,0.\nGRID,32,,4.,1.,0.\nGRID,33,,3.,1.,0.\nCQUAD8,20,9,30,31,32,33\nCTRIA6,21,9,30,31,32\nCQUADR,22,9,30,31,32,33\nCTRIAR,23,9,30,31,32\n")
     scene, left_out = converted(tmp_path, "BEGIN BULK\n" + GRIDS + more, "deck.fem")
     assert scene["connector"][0]["locked"] == "x rz" and scene["connector"][0]["stiffness"] == [0, 2, 0, 0, 0, 0]
     assert scene["beam"][0]["diameter"] == pytest.approx(0.2)
     assert scene["part"][2]["thickness"] == 0.01 and left_out == []
+
+
+REGIONS = "BSURFS,1,,,,1,5,6,7\nBSURFS,2,,,,2,9,10,11\nPSHELL,9,1,.01,1\nCQUAD4,20,9,13,14,15,16\nBSURF,3,20\n"
+
+
+@pytest.mark.parametrize("case, cards, contacts, ties, left_out", [
+    ("BCSET = 100\n", "BCTADD,100,101\nBCTSET,101,2,1,.4,0.,.25\nBCTSET,102,2,1,.2\n", [("region_1", "region_2", 0.4)], [],
+     ["BCTSET 102, which the case control does not select"]),
+    ("", "BCTSET,101,2,1,,,.25,,,+\n+,,3,1,.3\n", [("region_1", "region_2", 0), ("region_1", "region_3", 0.3)], [], []),
+    ("BGSET = 5\n", "BGSET,5,2,1,.01\n", [], [("region_2", "region_1")], []),
+])
+def test_regions_of_nx_nastran(tmp_path, case, cards, contacts, ties, left_out):
+    """Pairs of faces of solids and of flat elements, which the case control selects, in contact or glued."""
+    scene, notes = converted(tmp_path, case + "BEGIN BULK\n" + GRIDS + REGIONS + cards, "deck.dat")
+    assert [(of["rotor"], of["stator"], of["friction"]) for of in scene.get("contact", [])] == contacts
+    assert [(of["slave"], of["master"]) for of in scene.get("tie", [])] == ties
+    assert [note.partition(" (")[0] for note in notes if "PSHELL" not in note] == left_out
+
+
+def test_a_region_that_is_not_defined_is_refused(tmp_path):
+    (tmp_path / "deck.bdf").write_text("BEGIN BULK\n" + GRIDS + REGIONS + "BCTSET,101,2,7\n")
+    with pytest.raises(TOOL.Problem, match="BCTSET 101: the region '7' is not defined.*known are 1, 2, 3"):
+        TOOL.read_deck(tmp_path / "deck.bdf")
 
 
 def test_repeated_cards_are_refused(tmp_path):

@@ -274,7 +274,8 @@ def pre_tension(block, deck):
     deck.model.joints.of_bolts.add(node)
 
 
-HANDLERS = {"COUPLING": coupling, "KINEMATIC": kinematic, "DISTRIBUTING": distributing, "DISTRIBUTING COUPLING": distributing_coupling, "KINEMATIC COUPLING": kinematic_coupling,
+HANDLERS = {"COUPLING": coupling, "KINEMATIC": kinematic, "DISTRIBUTING": distributing, "DISTRIBUTING COUPLING": distributing_coupling,
+            "KINEMATIC COUPLING": kinematic_coupling,
             "RIGID BODY": rigid_body, "MPC": mpc, "EQUATION": equation, "SPRING": spring, "DASHPOT": spring, "MASS": mass,
             "ROTARY INERTIA": rotary_inertia, "BEAM SECTION": beam_section, "PRE-TENSION SECTION": pre_tension}
 OPTIONS = {"COUPLING": "CONSTRAINT NAME,REF NODE,SURFACE,ALPHA", "KINEMATIC": "", "DISTRIBUTING": "WEIGHTING METHOD,COUPLING",

@@ -307,7 +307,8 @@ def read_types(words, lines, deck):
         deck.options |= {(values[0], i): value for i, value in enumerate(values[2:], 1)}
 
 
-BLOCKS = {"ETBLOCK": read_types, "DBLOCK": ansys_loads.support_block, "SFEBLOCK": ansys_loads.surface_block, "RLBLOCK": read_reals, "SECBLOCK": ansys_equations.section_block, "SFE": ansys_loads.surface_load,
+BLOCKS = {"ETBLOCK": read_types, "DBLOCK": ansys_loads.support_block, "SFEBLOCK": ansys_loads.surface_block,
+          "RLBLOCK": read_reals, "SECBLOCK": ansys_equations.section_block, "SFE": ansys_loads.surface_load,
           "NBLOCK": read_nodes, "EBLOCK": read_elements, "CMBLOCK": read_component}
 
 # ---- commands
@@ -353,7 +354,8 @@ def rotation(words, place, deck):
         deck.turning.append((words[1] if len(words) > 1 else "", rate, place))
 
 
-COMMANDS = {"R": real_constants, "CMROTATE": rotation, "KEYOPT": key_option, "KEYOP": key_option, "KEYO": key_option, "ET": element_type, "MPDATA": material_data, "MP": material_data,
+COMMANDS = {"R": real_constants, "CMROTATE": rotation, "KEYOPT": key_option, "KEYOP": key_option, "KEYO": key_option,
+            "ET": element_type, "MPDATA": material_data, "MP": material_data,
             "N": node, "CE": ansys_equations.read_equation, "SECTYPE": ansys_equations.section_type, "SECDATA": ansys_equations.section_data,
             "SLOAD": ansys_equations.section_load, **ansys_loads.COMMANDS, **ansys_selection.COMMANDS}
 

@@ -7,6 +7,7 @@ from collections import Counter
 import numpy as np
 from squeal.common import counted
 from squeal import nastran_bolts
+from squeal import nastran_contacts
 from squeal import nastran_joining
 from squeal.deck_files import Problem, lines_of, number, span, undefined, whole
 from squeal.mesh_model import FLAT, MOTIONS, Model, corners_of
@@ -15,13 +16,14 @@ from squeal.nastran_properties import note_shell_fields, read_materials, read_pr
 
 ELEMENTS = {("CHEXA", 8): "hex8", ("CHEXA", 20): "hex20", ("CPENTA", 6): "wedge6", ("CTETRA", 4): "tet4",
             ("CTETRA", 10): "tet10", ("CQUAD4", 4): "quad4", ("CTRIA3", 3): "tri3", ("CTRIA6", 6): "tri6", ("CTRIA6", 3): "tri3", ("CQUAD8", 8): "quad8",
-            ("CQUAD8", 4): "quad4"}
+            ("CQUAD8", 4): "quad4", ("CQUADR", 4): "quad4", ("CTRIAR", 3): "tri3"}
 CORNERS = {"CHEXA": (8, 20), "CPENTA": (6, 15), "CTETRA": (4, 10), "CQUAD4": (4, 4), "CTRIA3": (3, 3), "CTRIA6": (6, 6),
-           "CQUAD8": (8, 8), "CPYRAM": (5, 13)}
+           "CQUAD8": (8, 8), "CQUADR": (4, 4), "CTRIAR": (3, 3), "CPYRAM": (5, 13)}
+LINEAR_SHELLS = ("CQUAD4", "CTRIA3", "CQUADR", "CTRIAR")  # whose fields behind the nodes are others
 UPPER = {"EIGRL": 4, "EIGRA": 4, "EIGR": 5}  # fields of the highest frequency
 WITHOUT_ELEMENT = {("CPENTA", 15), ("CPYRAM", 5), ("CPYRAM", 13)}
 READ = {*UPPER, "GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "CORD1R", "CORD1C", "CORD1S", "PSOLID", "PSHELL", "MAT1", "MAT9", "MATORT", "SPC", "SPC1", "SPCADD",
-        "SET1", "SET3", "PARAM", "ENDDATA", *CORNERS, *nastran_joining.READ, *nastran_bolts.READ}
+        "SET1", "SET3", "PARAM", "ENDDATA", *CORNERS, *nastran_joining.READ, *nastran_bolts.READ, *nastran_contacts.READ}
 
 
 class Deck:
@@ -124,6 +126,7 @@ def read_bdf(file):
         for card in cards:
             if card.name in nastran_joining.HANDLERS and (card.name == "SURF") == (name == "SURF"):
                 nastran_joining.HANDLERS[card.name](card, deck)
+    nastran_contacts.read_contacts(cards, case, deck)
     nastran_joining.read_loads(cards, case, deck)
     nastran_bolts.read_bolts(cards, case, deck)
     model.band = max((card.number(UPPER[card.name], 0.0) for card in cards if card.name in UPPER), default=0.0)
@@ -145,7 +148,7 @@ def read_at_once(name, cards, model, of_property):
     """Whether all have as many nodes, and nothing is wrong with them."""
     texts = table_of(cards)
     most = CORNERS[name][1]
-    if texts is None or texts.shape[1] < 2 + most and name in ("CQUAD4", "CTRIA3"):
+    if texts is None or texts.shape[1] < 2 + most and name in LINEAR_SHELLS:
         return False
     given = ~is_blank(texts[:, : 2 + most])
     count = int(given[0].sum())
@@ -168,7 +171,7 @@ def read_element(card, model, of_property):
         texts.pop()
     if "" in texts:
         raise Problem(f"{card.place}: {card.name} {card.field(2)} lacks some of its mid-side nodes; expected all or none")
-    if card.name in ("CQUAD4", "CTRIA3"):
+    if card.name in LINEAR_SHELLS:
         texts = texts[:fewest]
     if (card.name, len(texts)) not in ELEMENTS:
         known = [str(count) for name, count in ELEMENTS if name == card.name]
