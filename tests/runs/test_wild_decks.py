@@ -204,6 +204,7 @@ def test_regions_of_nx_nastran(tmp_path, case, cards, contacts, ties, left_out):
     scene, notes = converted(tmp_path, case + "BEGIN BULK\n" + GRIDS + REGIONS + cards, "deck.dat")
     assert [(of["rotor"], of["stator"], of["friction"]) for of in scene.get("contact", [])] == contacts
     assert [(of["slave"], of["master"]) for of in scene.get("tie", [])] == ties
+    assert [of.get("reach", 0) for of in scene.get("contact", [])] == [0.25, 0][: len(contacts)]
     assert [note.partition(" (")[0] for note in notes if "PSHELL" not in note] == left_out
 
 

@@ -36,7 +36,8 @@ def add_pairs(card, regions, deck):
         if card.name == "BGSET":
             deck.model.ties.append(sides)
         else:
-            deck.model.contacts.append((*sides, {"friction": deck.number(row[3] or "0", card)}))
+            reach = deck.number(row[5] or "0", card)
+            deck.model.contacts.append((*sides, {"friction": deck.number(row[3] or "0", card), **({"reach": reach} if reach > 0 else {})}))
 
 
 def region(card, deck):
