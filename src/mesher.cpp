@@ -1,7 +1,9 @@
 /// squeal_mesher: reads a mesh, or meshes a geometry, with libgmsh. squeal starts it; see src/mesh/mesh_file.cpp.
 ///
-///   squeal_mesher shut-in NAME [parameter value]…   reads the file of this name in a sandbox
-///   squeal_mesher free NAME [parameter value]…      lets a geometry run what it holds
+///   squeal_mesher shut-in NAME SIZES [parameter value]…   reads the file of this name in a sandbox
+///   squeal_mesher free NAME SIZES [parameter value]…      lets a geometry run what it holds
+///
+/// SIZES is a file of views that give the sizes of elements, or an empty text.
 ///
 /// The answer goes to a descriptor of its own. This program knows no MPI.
 ///
@@ -36,7 +38,7 @@ using namespace squeal;
 void initialise(int argc, char** argv)
 {
   std::vector<std::string> arguments = {"squeal_mesher"};
-  for (int i = 3; i + 1 < argc; i += 2) arguments.insert(arguments.end(), {"-setnumber", argv[i], argv[i + 1]});
+  for (int i = 4; i + 1 < argc; i += 2) arguments.insert(arguments.end(), {"-setnumber", argv[i], argv[i + 1]});
   std::vector<char*> pointers;
   for (std::string& argument : arguments) pointers.push_back(argument.data());
   gmsh::initialize(static_cast<int>(pointers.size()), pointers.data(), false);
@@ -103,19 +105,52 @@ void read_blocks(const std::vector<int>& index_of, FileMesh& mesh)
 /// Whether the file brought elements of surfaces or volumes.
 bool has_elements()
 {
-  for (const int dimension : {2, 3})
-  {
-    std::vector<int> types;
-    std::vector<std::vector<std::size_t>> elements, nodes;
-    gmsh::model::mesh::getElements(types, elements, nodes, dimension);
-    if (!types.empty()) return true;
-  }
-  return false;
+  std::vector<int> surfaces, volumes; // their types
+  gmsh::model::mesh::getElementTypes(surfaces, 2);
+  gmsh::model::mesh::getElementTypes(volumes, 3);
+  return !surfaces.empty() || !volumes.empty();
 }
 
-FileMesh read_or_generate(const std::string& file)
+/// Lets the views of a file give the sizes, each in and on the volumes of its name; the least one where they meet.
+void take_sizes(const std::string& file)
+{
+  namespace field = gmsh::model::mesh::field;
+  gmsh::merge(file);
+  gmsh::vectorpair volumes;
+  gmsh::model::getEntities(volumes, 3);
+  std::vector<int> views;
+  gmsh::view::getTags(views);
+  std::vector<double> fields;
+  for (const auto& [dimension, volume] : volumes)
+    for (std::size_t i = 0; i < views.size(); ++i)
+    {
+      std::string name;
+      gmsh::option::getString("View[" + std::to_string(i) + "].Name", name);
+      const std::vector<std::string> groups = groups_of(dimension, volume);
+      if (std::find(groups.begin(), groups.end(), name) == groups.end()) continue;
+      const int of_view = field::add("PostView"), within = field::add("Restrict");
+      field::setNumber(of_view, "ViewIndex", static_cast<double>(i));
+      field::setNumber(within, "InField", of_view);
+      gmsh::vectorpair entities = {{dimension, volume}}, boundary;
+      for (const char* list : {"VolumesList", "SurfacesList", "CurvesList", "PointsList"})
+      {
+        std::vector<double> tags;
+        for (const auto& entity : entities) tags.push_back(entity.second);
+        field::setNumbers(within, list, tags);
+        gmsh::model::getBoundary(entities, boundary, false, false);
+        entities.swap(boundary);
+      }
+      fields.push_back(within);
+    }
+  const int least = field::add("Min");
+  field::setNumbers(least, "FieldsList", fields);
+  field::setAsBackgroundMesh(least);
+}
+
+FileMesh read_or_generate(const std::string& file, const std::string& sizes)
 {
   gmsh::open(file);
+  if (!sizes.empty()) take_sizes(sizes);
   if (!has_elements()) gmsh::model::mesh::generate(3);
   std::string problem;
   gmsh::logger::getLastError(problem);
@@ -131,7 +166,7 @@ MesherAnswer answer_of(int argc, char** argv)
   try
   {
     initialise(argc, argv);
-    answer.mesh = read_or_generate(argv[2]);
+    answer.mesh = read_or_generate(argv[2], argv[3]);
   }
   catch (const std::string& text) // libgmsh before 4.9 throws strings
   {
@@ -219,7 +254,7 @@ std::string shut_in()
 
 int main(int argc, char** argv)
 {
-  if (argc < 3) return 2;
+  if (argc < 4) return 2;
   prctl(PR_SET_PDEATHSIG, SIGKILL); // with squeal it ends too
 #ifndef __SANITIZE_ADDRESS__        // it reserves more addresses than there are bytes
   limit_memory();

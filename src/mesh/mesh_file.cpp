@@ -49,8 +49,9 @@ void check_source(const MeshSource& source)
   if (source.statements == Statements::listed) check_first_bytes(source.file);
   if (is_geometry(source.file))
     check_parameters(source, input.parameters);
-  else if (!source.parameters.empty())
-    throw Error(source.file.string() + ": [mesh.parameters] need a .geo geometry; a mesh file has none. Remove them");
+  else if (!source.parameters.empty() || !source.size_field.empty())
+    throw Error(source.file.string() + ": [mesh.parameters] and mesh.size_field need a .geo geometry; a mesh file has "
+                                       "none. Remove them");
 }
 
 /// The mesher beside the program, or one folder up for programs in a folder of the build.
@@ -90,7 +91,8 @@ std::vector<char*> pointers_to(std::vector<std::string>& texts)
 std::vector<std::string> arguments_of(const MeshSource& source)
 {
   const char* rights = source.statements == Statements::any ? free_mesher : shut_in_mesher;
-  std::vector<std::string> arguments = {mesher_program().string(), rights, source.file.string()};
+  std::vector<std::string> arguments = {mesher_program().string(), rights, source.file.string(),
+                                        source.size_field.string()};
   for (const auto& [name, value] : source.parameters)
   {
     arguments.push_back(name);

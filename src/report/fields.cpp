@@ -341,6 +341,11 @@ void write_fields(const Report& report, const Scene& scene, const Model& model, 
   if (equilibrium.u.get())
     fields.write_rest(equilibrium.u, "equilibrium/displacement", "displacement at equilibrium [m]");
   write_modes(fields, report.point.modes);
+  for (int number = 0; const ModeCauses& causes : report.sensitivity.modes)
+  {
+    fields.write(causes.left[0], format("modes/%d/left_real", ++number));
+    fields.write(causes.left[1], format("modes/%d/left_imaginary", number));
+  }
   if (has_run(report.motion.settled.outcome))
     write_motion_shapes(fields, report.motion.settled.shapes, model.structure.load);
   for (std::size_t i = 0; i < cycle.measured.displacements.size(); ++i)

@@ -108,6 +108,9 @@ inline constexpr std::array field_sets = {
             "largest "
             "entry is 1. Where none is unstable the one that a given `cycle.start` has most of comes first"},
     DataSet{"modes/<number>/imaginary", "m", "its imaginary part"},
+    DataSet{"modes/<number>/left_real", "1/(N s)",
+            "real part of its left vector psi, with `[sensitivity]`; psi'Q'(lambda) phi = 1, Q of section 11"},
+    DataSet{"modes/<number>/left_imaginary", "1/(N s)", "its imaginary part"},
     DataSet{"modes/<number>/pair_power", "1/s", "power of each pair over the mode's mean energy, with `[sensitivity]`"},
     DataSet{"settled/shape_<number>", "kg^-1/2", "shapes of a settled motion, the strongest first"},
     DataSet{"cycle/displacement_<sample>", "m", "displacement at times spread evenly over the period of the cycle"},

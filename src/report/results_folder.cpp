@@ -229,6 +229,7 @@ std::vector<fs::path> inputs_of(const Scene& scene)
 {
   std::vector<fs::path> inputs = {scene.file};
   if (scene.mesh) append_mesh(scene.mesh->file, inputs);
+  if (scene.mesh && !scene.mesh->size_field.empty()) inputs.push_back(scene.mesh->size_field);
   if (scene.matrices) append_matrices(*scene.matrices, inputs);
   for (const Superelement& superelement : scene.superelements) append_matrices(superelement.folder, inputs);
   if (scene.transient.start.kind == StartKind::file) inputs.push_back(scene.transient.start.file);

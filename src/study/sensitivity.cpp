@@ -388,6 +388,28 @@ void find_change_effects(const SensitivityProblem& problem, Sensitivity& result)
   }
 }
 
+/// Keeps the left vector psi of each mode phi, of which the held right one is a multiple, with psi'Q'(lambda) phi = 1.
+void keep_left(const SensitivityProblem& problem, const HeldVectors& vectors, const AtHeldVectors& held,
+               Sensitivity& result)
+{
+  const auto count = static_cast<Eigen::Index>(vectors.count());
+  for (Eigen::Index re = 0, im = count; re < count; ++re, ++im)
+  {
+    const ComplexMode& mode = problem.modes.modes[static_cast<std::size_t>(re)];
+    const std::array parts{mode.real.get(), mode.imaginary.get()};
+    const Eigen::MatrixXd phi = inner_products(vectors.right, columns_of(parts)),
+                          own = inner_products(vectors.right, vectors.right);
+    const Complex multiple(phi(re, 0) + phi(im, 1), phi(re, 1) - phi(im, 0)),
+        factor = (own(re, re) + own(im, im)) / (multiple * held.slopes[static_cast<std::size_t>(re)]);
+    Eigen::MatrixXd turn = Eigen::MatrixXd::Zero(2 * count, 2);
+    turn.row(re) << factor.real(), factor.imag();
+    turn.row(im) << -factor.imag(), factor.real();
+    const MultiVector left = combination(vectors.left, turn);
+    for (const std::size_t part : {0, 1})
+      result.modes[static_cast<std::size_t>(re)].left[part] = column(left, part, problem.sliding.structure.load);
+  }
+}
+
 } // namespace
 
 Sensitivity find_sensitivity(const SensitivityProblem& problem)
@@ -397,6 +419,7 @@ Sensitivity find_sensitivity(const SensitivityProblem& problem)
   const HeldVectors vectors = unstable_vectors(problem, result);
   if (vectors.count() == 0) return result;
   const AtHeldVectors held = at_held_vectors(problem.sliding, vectors);
+  keep_left(problem, vectors, held, result);
   find_powers(problem.sliding, vectors, held, result);
   find_shares(problem, vectors, held, result);
   find_number_derivatives(problem, vectors, held, result);

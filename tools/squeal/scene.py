@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from squeal.common import SquealError
 
-PLACES = ("file", "folder", "gap_file", "table")  # keys whose texts are files or folders that are read
+PLACES = ("file", "folder", "gap_file", "size_field", "table")  # keys whose texts are files or folders that are read
 # keys whose values are texts or directions, for which no named number stands
 TEXTS = frozenset("axis axis_1 axis_2 beam bolts direction directions distribution excitation fidelity file fixed folder free "
-                  "gap_file key locked master mesh_error method motions name normal numbers on part probe rotor save_state section "
+                  "gap_file key locked master mesh_error method motions name normal numbers on part probe rotor save_state section size_field "
                   "slave stages start stator surfaces table tangents title".split())
 ENDS = ("from", "to")  # names of bodies in tables that join some, numbers in others
 JOINING = ("spring", "connector", "beam")

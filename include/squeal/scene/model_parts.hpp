@@ -322,6 +322,7 @@ struct MeshSource
   std::filesystem::path file;               // mesh or geometry that libgmsh reads; absolute
   std::map<std::string, double> parameters; // values for the DefineConstant of a .geo, in its own units
   double scale = 1;                         // [m] length unit of the file
+  std::filesystem::path size_field{};       // gmsh views of the sizes of a geometry's elements, absolute; empty: none
   int refine = 0;                           // [-] number of times that every element is divided
   Statements statements{};                  // not of the scene file, but of the command line
 };

@@ -1,0 +1,265 @@
+"""The error of the mesh in eigenvalues, element by element, by recovered strains (Zienkiewicz and Zhu 1992).
+
+A mode's strains are fitted by polynomials about each corner, over the elements round it that are of one part. What is recovered
+is closer to the truth than the strains themselves, so that its distance from them tells the error. With the left vector psi of
+a mode phi, of the slope psi'Q'(lambda) phi = 1, an eigenvalue is off by
+
+    lambda - lambda_h = sum over elements of int (e*(psi) - e(psi))' D (e*(phi) - e(phi)) (1 + beta lambda + i eta) dV
+
+Without a left vector the conjugate of phi takes its place, and the slope is that of a structure which is all solids: then friction
+does not turn the answer. Caveats: shells, beams, springs and the error of the contact conditions have no part in it; a mesh that
+is too coarse for a mode has nothing to recover.
+"""
+
+import tomllib
+from collections import defaultdict
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from squeal.results import Missing, Results
+from squeal.scene import with_numbers
+from squeal.solid_elements import KINDS, TETRA4, TETRA10, Elements, elasticity, monomials
+from squeal.surface import elements as elements_of
+
+CHUNK = 512  # elements at a time
+MODES = 8  # at most so many
+
+
+@dataclass
+class Block:
+    """Elements of one kind and one part."""
+
+    code: int
+    part: int
+    cells: np.ndarray  # their places among all elements of the file
+    nodes: np.ndarray  # (element, node)
+    elements: Elements
+    stiffening: np.ndarray  # of each mode: 1 + beta lambda + i eta
+    beta: float
+
+
+@dataclass
+class ModeEstimate:
+    """What the mesh leaves open on one mode."""
+
+    number: int
+    lam: complex  # [1/s] on this mesh
+    of_cells: np.ndarray  # complex [1/s], of each element of the file
+    with_left: bool
+    refined: dict[str, Any] = field(default_factory=dict)  # modes.mesh_error of the report
+
+    @property
+    def change(self) -> complex:
+        """What is to be added to the eigenvalue [1/s]."""
+        return complex(self.of_cells.sum())
+
+    @property
+    def refined_change(self) -> complex | None:
+        """The same by the finer mesh, where the run had one."""
+        if not self.refined:
+            return None
+        hertz = self.refined["corrected_frequency_hz"] - self.refined["frequency_hz"]
+        return complex(self.refined["corrected_growth_rate"] - self.refined["growth_rate"], 2 * np.pi * hertz)
+
+
+@dataclass
+class MeshEstimate:
+    """What the mesh leaves open on each mode whose shape is there."""
+
+    modes: list[ModeEstimate]
+    blocks: list[Block]
+    part_names: list[str]
+    nodes: np.ndarray
+    cells: int  # of the file, points included
+    on_contact: np.ndarray  # of each element: whether a face of it is in loaded contact
+
+    def parts(self, values: np.ndarray) -> dict[str, float]:
+        """Sums over the elements of each part."""
+        sums: dict[str, float] = defaultdict(float)
+        for block in self.blocks:
+            sums[self.part_names[block.part]] += float(values[block.cells].sum())
+        return dict(sums)
+
+
+def scene_of(run: Results) -> dict[str, Any]:
+    """The scene that was run, with every default."""
+    file = run.folder / "resolved.toml"
+    if not file.exists():
+        raise Missing(f"there is no {file}, which has the materials")
+    return with_numbers(tomllib.loads(file.read_text()))
+
+
+def mode_vectors(run: Results) -> tuple[list[dict[str, Any]], np.ndarray, list[int]]:
+    """The modes that are asked about, their fields (node, 3, field), and the field of each one's left vector or -1."""
+    modes = run.stage("modes")["modes"]
+    found, columns, left = [], [], []
+    for number in run.mode_numbers():
+        if number > len(modes) or modes[number - 1]["frequency_hz"] == 0:
+            continue
+        found.append(modes[number - 1] | {"number": number})
+        columns.append(run.shape(number))
+        if not modes[number - 1]["unstable"]:
+            break  # the next stable one
+    for mode in found[:MODES]:
+        try:
+            parts = [run.field(f"modes/{mode['number']}/left_{part}") for part in ("real", "imaginary")]
+        except Missing:
+            left.append(-1)
+            continue
+        left.append(len(found[:MODES]) + sum(k >= 0 for k in left))
+        columns.insert(left[-1], parts[0] + 1j * parts[1])
+    if not found:
+        raise Missing("the run kept no shape of a mode that oscillates: -modes_shapes all keeps those of stable ones too")
+    count = len(found[:MODES])
+    return found[:MODES], np.stack(columns[:count] + columns[count : count + sum(k >= 0 for k in left)], axis=-1), left
+
+
+def damping_of(part: dict[str, Any], scene: dict[str, Any]) -> tuple[float, float]:
+    """beta and eta of a part."""
+    own = "alpha" in part or "beta" in part
+    return (part if own else scene.get("damping", {})).get("beta", 0.0), part.get("loss_factor", 0.0)
+
+
+def blocks_of(run: Results, scene: dict[str, Any], lam: np.ndarray) -> tuple[list[Block], int]:
+    """The solids by kind and part, and the number of elements of the file."""
+    part = run.field("mesh/part")
+    met: dict[tuple[int, int], tuple[list[int], list[list[int]]]] = defaultdict(lambda: ([], []))
+    for cell, (code, nodes) in enumerate(elements_of(run.field("mesh/topology"))):
+        if code in KINDS:
+            cells, rows = met[int(part[cell]), code]
+            cells.append(cell)
+            rows.append(nodes)
+    blocks, places = [], run.nodes
+    for (number, code), (cells, rows) in sorted(met.items()):
+        of = scene["part"][number]
+        beta, eta = damping_of(of, scene)
+        nodes = np.array(rows)
+        D = np.broadcast_to(elasticity(of), (len(rows), 6, 6))
+        blocks.append(Block(code, number, np.array(cells), nodes, Elements(KINDS[code], places[nodes], D),
+                            1 + beta * lam + 1j * eta * (lam.imag > 0), beta))
+    if not blocks:
+        raise Missing("the scene has no solid elements: shells, points and matrices have no estimate")
+    return blocks, len(part)
+
+
+class Recovered:
+    """Polynomials for the strains of a part about each of its corners."""
+
+    def __init__(self, blocks: list[Block], nodes: np.ndarray, fields: np.ndarray) -> None:
+        """blocks: of one part. nodes: places. fields: (node, 3, field)."""
+        self.exponents = TETRA10 if any(KINDS[block.code].order == 2 for block in blocks) else TETRA4
+        best = [self._samples(block, KINDS[block.code].samples, fields) for block in blocks]
+        self.corners, rows = np.unique(np.concatenate([block.nodes[:, : len(KINDS[block.code].corners)].ravel() for block in blocks]),
+                                       return_inverse=True)
+        self.of_block, of_element, at = [], [], 0
+        for block in blocks:
+            shape = (len(block.nodes), len(KINDS[block.code].corners))
+            self.of_block.append(rows[at : at + shape[0] * shape[1]].reshape(shape))
+            at += shape[0] * shape[1]
+            of_element += list(self.of_block[-1])
+        self._around: list[list[int]] = [[] for _ in self.corners]
+        for element, corners in enumerate(of_element):
+            for corner in corners:
+                self._around[corner].append(element)
+        self._of_element = of_element
+        samples = [place_and_strain for block in best for place_and_strain in zip(*block)]
+        every: list[Any] = []
+        self.centre = nodes[self.corners]
+        self.scale = np.ones(len(self.corners))
+        self.fits = np.zeros((len(self.corners), len(self.exponents), 6 * fields.shape[-1]), complex)
+        for corner in range(len(self.corners)):
+            if not self._fit(corner, samples):
+                every = every or [pair for block in blocks for pair in zip(*self._samples(block, KINDS[block.code].rule[0], fields))]
+                self._fit(corner, every, last=True)
+
+    @staticmethod
+    def _samples(block: Block, xi: np.ndarray, fields: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places and strains of each element at some points: (element, point, 3), (element, point, 6 field)."""
+        strains = block.elements.strains(xi, fields[block.nodes])
+        return block.elements.at(xi)[0], strains.reshape(*strains.shape[:2], -1)
+
+    def _fit(self, corner: int, samples: list[tuple[np.ndarray, np.ndarray]], last: bool = False) -> bool:
+        """Fits the samples of the elements round a corner; of more elements where these do not settle the polynomial. Whether
+        any did, or what is there, if it is the last try."""
+        ring = self._around[corner]
+        for _ in range(3):
+            places = np.concatenate([samples[element][0] for element in ring]) - self.centre[corner]
+            scale = np.abs(places).max()
+            A = monomials(places / scale, self.exponents)
+            if len(A) >= len(self.exponents) + 2:
+                values = np.concatenate([samples[element][1] for element in ring])
+                solution, _, _, singular = np.linalg.lstsq(A.astype(complex), values, rcond=1e-3)
+                self.fits[corner], self.scale[corner] = solution, scale
+                if singular[-1] > 1e-2 * singular[0] / len(self.exponents):
+                    return True
+            ring = sorted({near for element in ring for other in self._of_element[element] for near in self._around[other]})
+        return last
+
+    def at(self, block: int, chunk: slice, places: np.ndarray, shares: np.ndarray) -> np.ndarray:
+        """Strains at points (element, point, 3) of a block's elements: those of their corners, by shares (point, corner)."""
+        total = 0
+        for k in range(shares.shape[1]):
+            corner = self.of_block[block][chunk, k]
+            x = (places - self.centre[corner, None]) / self.scale[corner, None, None]
+            total = total + shares[None, :, k, None] * np.matmul(monomials(x, self.exponents), self.fits[corner])
+        return np.asarray(total)
+
+
+def energies(block: Block, of_block: int, recovered: Recovered, fields: np.ndarray, left: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Of each element and mode: int of the products of what is missing in strains of both vectors, and of the strains."""
+    kind, count = KINDS[block.code], len(left)
+    xi, weights = kind.rule
+    shares = kind.corner_values(xi)
+    missing, whole = np.zeros((2, len(block.nodes), count), complex)
+    for first in range(0, len(block.nodes), CHUNK):
+        chunk = slice(first, first + CHUNK)
+        part = Elements(kind, block.elements.places[chunk], block.elements.D[chunk])
+        places, det = part.at(xi)
+        strain = part.strains(xi, fields[block.nodes[chunk]])
+        lacking = recovered.at(of_block, chunk, places, shares).reshape(strain.shape) - strain
+        w, D = weights * np.abs(det), block.elements.D[0]
+        for mode, other in enumerate(left):
+            for result, values in ((missing, lacking), (whole, strain)):
+                psi = values[..., other] if other >= 0 else values[..., mode].conj()
+                result[chunk, mode] = np.einsum("eqi,ij,eqj,eq->e", psi, D, values[..., mode], w, optimize=True)
+    return missing, whole
+
+
+def contact_elements(run: Results, blocks: list[Block], cells: int) -> np.ndarray:
+    """Whether each element of the file has a face in loaded contact."""
+    result = np.zeros(cells, bool)
+    try:
+        loaded = run.field("equilibrium/normal_reaction") != 0
+    except Missing:
+        return result
+    for block in blocks:
+        corners = block.nodes[:, : len(KINDS[block.code].corners)]
+        result[block.cells] = loaded[corners].sum(axis=1) >= 3
+    return result
+
+
+def estimate(run: Results) -> MeshEstimate:
+    """The estimate of a run's modes; Missing where it has no shapes or no solids."""
+    scene = scene_of(run)
+    modes, fields, left = mode_vectors(run)
+    lam = np.array([mode["growth_rate"] + 2j * np.pi * mode["frequency_hz"] for mode in modes])
+    blocks, cells = blocks_of(run, scene, lam)
+    of_cells = np.zeros((cells, len(modes)), complex)
+    strain, damped = np.zeros((2, len(modes)), complex)
+    for number in sorted({block.part for block in blocks}):
+        own = [block for block in blocks if block.part == number]
+        recovered = Recovered(own, run.nodes, fields)
+        for place, block in enumerate(own):
+            missing, whole = energies(block, place, recovered, fields, left)
+            of_cells[block.cells] = missing * block.stiffening
+            strain += whole.sum(axis=0)
+            damped += block.beta * whole.sum(axis=0)
+    known = np.array(left) >= 0
+    slopes = np.where(known, 1, damped - 2 * (strain + lam * damped) / lam)  # of solids alone: psi'(2 lambda M + beta K) phi
+    refined = run.report["modes"].get("mesh_error", {}).get("modes", [])
+    of_mode = [next((entry for entry in refined if abs(entry["frequency_hz"] / mode["frequency_hz"] - 1) < 1e-6
+                     and np.isfinite(entry.get("finer_frequency_hz") or np.nan)), {}) for mode in modes]
+    estimates = [ModeEstimate(mode["number"], lam[k], of_cells[:, k] / slopes[k], bool(known[k]), of_mode[k]) for k, mode in enumerate(modes)]
+    return MeshEstimate(estimates, blocks, [part["name"] for part in scene["part"]], run.nodes, cells,
+                        contact_elements(run, blocks, cells))
