@@ -112,3 +112,15 @@ def write_sizes(file: Path, found: MeshEstimate, factors: list[np.ndarray], scal
 def elements_foreseen(factors: list[np.ndarray]) -> float:
     """How many elements these factors make."""
     return float(sum((factor**-3).sum() for factor in factors))
+
+
+def left_open(found: MeshEstimate, part: float) -> dict[int, float]:
+    """Of each unstable mode, or of the first one, the part of its error that may stay, such that the bar is this part of its growth
+    rate: the bar of the finer mesh where the run has one, else what is estimated."""
+    asked = [mode for mode in found.modes if mode.lam.real > 0] or found.modes[:1]
+    result = {}
+    for mode in asked:
+        bar = mode.refined["growth_error"] if mode.refined else abs(mode.change.real)
+        growth = abs(mode.refined["corrected_growth_rate"] if mode.refined else mode.lam.real)
+        result[mode.number] = part * growth / bar if bar > 0 else np.inf
+    return result
