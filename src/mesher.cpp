@@ -3,7 +3,7 @@
 ///   squeal_mesher shut-in NAME SIZES [parameter value]…   reads the file of this name in a sandbox
 ///   squeal_mesher free NAME SIZES [parameter value]…      lets a geometry run what it holds
 ///
-/// SIZES is a file of views that give the sizes of elements, or an empty text.
+/// SIZES is a script that gives the sizes of elements, or an empty text.
 ///
 /// The answer goes to a descriptor of its own. This program knows no MPI.
 ///
@@ -111,40 +111,18 @@ bool has_elements()
   return !surfaces.empty() || !volumes.empty();
 }
 
-/// Lets the views of a file give the sizes, each in and on the volumes of its name; the least one where they meet.
+/// Merges a script of sizes, which finds the tags of named volumes as its numbers "Volumes/NAME".
 void take_sizes(const std::string& file)
 {
-  namespace field = gmsh::model::mesh::field;
+  gmsh::vectorpair groups;
+  gmsh::model::getPhysicalGroups(groups, 3);
+  for (const auto& [dimension, group] : groups)
+  {
+    std::string name;
+    gmsh::model::getPhysicalName(dimension, group, name);
+    gmsh::onelab::setNumber("Volumes/" + name, {static_cast<double>(group)});
+  }
   gmsh::merge(file);
-  gmsh::vectorpair volumes;
-  gmsh::model::getEntities(volumes, 3);
-  std::vector<int> views;
-  gmsh::view::getTags(views);
-  std::vector<double> fields;
-  for (const auto& [dimension, volume] : volumes)
-    for (std::size_t i = 0; i < views.size(); ++i)
-    {
-      std::string name;
-      gmsh::option::getString("View[" + std::to_string(i) + "].Name", name);
-      const std::vector<std::string> groups = groups_of(dimension, volume);
-      if (std::find(groups.begin(), groups.end(), name) == groups.end()) continue;
-      const int of_view = field::add("PostView"), within = field::add("Restrict");
-      field::setNumber(of_view, "ViewIndex", static_cast<double>(i));
-      field::setNumber(within, "InField", of_view);
-      gmsh::vectorpair entities = {{dimension, volume}}, boundary;
-      for (const char* list : {"VolumesList", "SurfacesList", "CurvesList", "PointsList"})
-      {
-        std::vector<double> tags;
-        for (const auto& entity : entities) tags.push_back(entity.second);
-        field::setNumbers(within, list, tags);
-        gmsh::model::getBoundary(entities, boundary, false, false);
-        entities.swap(boundary);
-      }
-      fields.push_back(within);
-    }
-  const int least = field::add("Min");
-  field::setNumbers(least, "FieldsList", fields);
-  field::setAsBackgroundMesh(least);
 }
 
 FileMesh read_or_generate(const std::string& file, const std::string& sizes)

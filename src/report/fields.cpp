@@ -341,10 +341,11 @@ void write_fields(const Report& report, const Scene& scene, const Model& model, 
   if (equilibrium.u.get())
     fields.write_rest(equilibrium.u, "equilibrium/displacement", "displacement at equilibrium [m]");
   write_modes(fields, report.point.modes);
-  for (int number = 0; const ModeCauses& causes : report.sensitivity.modes)
+  const Owned<Vec> part = zeros_like(model.structure.load);
+  for (std::size_t i = 0; i < 2 * report.sensitivity.modes.size(); ++i)
   {
-    fields.write(causes.left[0], format("modes/%d/left_real", ++number));
-    fields.write(causes.left[1], format("modes/%d/left_imaginary", number));
+    copy_column(report.sensitivity.modes[i / 2].left, i % 2, part);
+    fields.write(part, format("modes/%zu/left_%s", i / 2 + 1, i % 2 ? "imaginary" : "real"));
   }
   if (has_run(report.motion.settled.outcome))
     write_motion_shapes(fields, report.motion.settled.shapes, model.structure.load);

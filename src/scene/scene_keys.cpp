@@ -84,7 +84,7 @@ SceneKeys keys_of(MeshSource& m)
   return {
       {"file", &m.file, "path", "a .geo to mesh, or a mesh with named groups that gmsh reads", required, file},
       {"scale", &m.scale, "m", "length unit of the file", positive},
-      {"size_field", &m.size_field, "path", "gmsh's views of sizes of a .geo's elements, named as its volumes", file},
+      {"size_field", &m.size_field, "path", "sizes of elements that gmsh merges after the .geo", file},
       {"refine", &m.refine, "-", "number of times that each element is divided, a solid in 8", not_negative},
       {"parameters", &m.parameters, "table", "values for the DefineConstant of a .geo"},
   };

@@ -393,20 +393,18 @@ void keep_left(const SensitivityProblem& problem, const HeldVectors& vectors, co
                Sensitivity& result)
 {
   const auto count = static_cast<Eigen::Index>(vectors.count());
+  const Eigen::MatrixXd own = inner_products(vectors.right, vectors.right);
   for (Eigen::Index re = 0, im = count; re < count; ++re, ++im)
   {
-    const ComplexMode& mode = problem.modes.modes[static_cast<std::size_t>(re)];
-    const std::array parts{mode.real.get(), mode.imaginary.get()};
-    const Eigen::MatrixXd phi = inner_products(vectors.right, columns_of(parts)),
-                          own = inner_products(vectors.right, vectors.right);
+    const auto mode = static_cast<std::size_t>(re);
+    const std::array shape{problem.modes.modes[mode].real.get(), problem.modes.modes[mode].imaginary.get()};
+    const Eigen::MatrixXd phi = inner_products(vectors.right, columns_of(shape));
     const Complex multiple(phi(re, 0) + phi(im, 1), phi(re, 1) - phi(im, 0)),
-        factor = (own(re, re) + own(im, im)) / (multiple * held.slopes[static_cast<std::size_t>(re)]);
+        factor = (own(re, re) + own(im, im)) / (multiple * held.slopes[mode]);
     Eigen::MatrixXd turn = Eigen::MatrixXd::Zero(2 * count, 2);
     turn.row(re) << factor.real(), factor.imag();
     turn.row(im) << -factor.imag(), factor.real();
-    const MultiVector left = combination(vectors.left, turn);
-    for (const std::size_t part : {0, 1})
-      result.modes[static_cast<std::size_t>(re)].left[part] = column(left, part, problem.sliding.structure.load);
+    result.modes[mode].left = combination(vectors.left, turn);
   }
 }
 

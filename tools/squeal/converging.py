@@ -94,7 +94,8 @@ class Converging:
         dofs, _ = self.model_of(mesh)
         if dofs > self.most:
             raise Ended(f"the next mesh has {dofs} degrees of freedom, and --most {self.most} allows no more")
-        results = run(self.file, mesh.overrides, self.ranks, self.options, self.output / name)
+        shapes = ["-modes_shapes", "all"]  # of the stable mode nearest to growing, too
+        results = run(self.file, mesh.overrides, self.ranks, [*shapes, *self.options], self.output / name)
         error = results.report["modes"].get("mesh_error", {})
         if error.get("outcome") != "converged":
             stage = next((f"{stage} {entry['outcome']}: {entry.get('reason', '')}" for stage, entry in results.report.items()
@@ -167,7 +168,10 @@ def by_all_sizes(work: Converging, first: Step) -> Callable[[int, Step], Mesh]:
 
 def by_key(work: Converging, key: str, order: int) -> Callable[[int, Step], Mesh]:
     """A number of the geometry, raised as the bar asks for if it goes with this order."""
-    value = [work.scene.get_key(key)]
+    try:
+        value = [work.scene.get_key(key)]
+    except SquealError:
+        raise SquealError(f"{work.place}: it gives {key} no value that could be raised: write the present one there") from None
     def next_mesh(number: int, before: Step) -> Mesh:
         factor = min((before.worst / (MARGIN * work.part))**(1 / order), 1.5)
         value[0] = max(value[0] + 1, int(np.ceil(factor * value[0])))

@@ -16,12 +16,38 @@ from squeal.solid_elements import KINDS
 FINEST, COARSEST = 1 / 3, 1.5  # factors of one step: beyond them the estimate of this mesh tells little
 GROWTH = 0.6  # of sizes over the distance, at most
 VIEWS = {6: "SS", 38: "SS", 9: "SH", 48: "SH", 8: "SI"}  # gmsh's names of lists of scalars
-FORMAT_HEAD = """// Sizes of elements for {title}: squeal takes the file as mesh.size_field.
+HEAD = """// Sizes of elements for {title}: mesh.size_field of a scene takes the file, and so does Merge at the end of a .geo.
+// A view has the sizes of one part, within and on the volumes of its name; the least one holds where parts meet.
 Mesh.MeshSizeFromPoints = 0;
 Mesh.MeshSizeFromCurvature = 0;
 Mesh.MeshSizeExtendFromBoundary = 0;
 Mesh.MeshSizeMin = 0;
 Mesh.MeshSizeMax = {largest:.4g}; // also where no element is near, as beyond chords of curved sides
+f = 1000;
+"""
+# squeal tells a script the tags of named volumes; where a .geo merges it by itself they are not known, and the view is for all.
+FIELD = """f += 2;
+Field[f] = PostView;
+Field[f].ViewIndex = PostProcessing.NbViews - 1;
+group = DefineNumber[0, Name "Volumes/{name}"];
+v[] = Volume{{:}};
+If (group)
+  v[] = Physical Volume{{group}};
+EndIf
+s[] = Unique(Abs(Boundary{{ Volume{{v[]}}; }}));
+c[] = Unique(Abs(Boundary{{ Surface{{s[]}}; }}));
+p[] = Unique(Abs(Boundary{{ Curve{{c[]}}; }}));
+Field[f + 1] = Restrict;
+Field[f + 1].InField = f;
+Field[f + 1].VolumesList = {{v[]}};
+Field[f + 1].SurfacesList = {{s[]}};
+Field[f + 1].CurvesList = {{c[]}};
+Field[f + 1].PointsList = {{p[]}};
+sizes[] += {{f + 1}};
+"""
+TAIL = """Field[1000] = Min;
+Field[1000].FieldsList = {sizes[]};
+Background Field = 1000;
 """
 
 
@@ -97,7 +123,7 @@ def sizes_at_corners(found: MeshEstimate, factors: list[np.ndarray]) -> list[np.
 def write_sizes(file: Path, found: MeshEstimate, factors: list[np.ndarray], scale: float, title: str) -> None:
     """The file of views, one for each part under its name, in the unit of the geometry's file. scale: that unit [m]."""
     corners = sizes_at_corners(found, factors)
-    text = [FORMAT_HEAD.format(title=title, largest=max(sizes.max() for sizes in corners) / scale)]
+    text = [HEAD.format(title=title, largest=max(sizes.max() for sizes in corners) / scale)]
     for part in sorted({block.part for block in found.blocks}):
         text.append(f'View "{found.part_names[part]}" {{\n')
         for block, sizes in zip(found.blocks, corners):
@@ -105,7 +131,8 @@ def write_sizes(file: Path, found: MeshEstimate, factors: list[np.ndarray], scal
                 for places, values in zip(corners_of(block) / scale, sizes / scale):
                     numbers = ",".join(f"{x:.7g}" for x in places.ravel())
                     text.append(f"{VIEWS[block.code]}({numbers}){{{','.join(f'{x:.4g}' for x in values)}}};\n")
-        text.append("};\n")
+        text += ["};\n", FIELD.format(name=found.part_names[part])]
+    text.append(TAIL)
     file.write_text("".join(text))
 
 

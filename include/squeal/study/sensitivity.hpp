@@ -43,12 +43,12 @@ struct ModeCauses
 {
   std::complex<double> lambda;
   double backward_error = 0; // the larger one of the right and of the left vector
+  MultiVector left{};        // real and imaginary part of psi, with psi'Q'(lambda) phi = 1 by the mode phi
   std::vector<NumberDerivative> numbers;
   std::vector<ProbeDerivative> probes;
-  std::array<Owned<Vec>, 2> left{};   // real and imaginary part of psi, with psi'Q'(lambda) phi = 1 by the mode phi
-  std::vector<EnergyShare> shares;    // their sums are one
-  std::vector<double> pair_powers;    // by reactions that change, of each pair
-  std::vector<double> contact_powers; // the same of each contact
+  std::vector<EnergyShare> shares;             // their sums are one
+  std::vector<double> pair_powers;             // by reactions that change, of each pair
+  std::vector<double> contact_powers;          // the same of each contact
   std::vector<double> falling_friction_powers; // by the law: negative where friction rises with the speed
   std::vector<double> turning_friction_powers; // by the direction of friction, which damps: not positive
   double damping_power = 0;                    // that C and loss factors take
