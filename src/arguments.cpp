@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
+#include <unistd.h>
 
 namespace squeal
 {
@@ -13,65 +16,55 @@ namespace squeal
 namespace
 {
 
-/// A number of seconds above 0; otherwise sets the problem.
-void read_seconds(const std::string& word, const std::string& value, double& seconds, std::string& problem)
+/// The arguments of squeal's own. Units name their values.
+SceneKeys keys_of(Arguments& a)
 {
-  char* end = nullptr;
-  seconds = std::strtod(value.c_str(), &end);
-  if (*end != 0 || !(seconds > 0)) problem = word + " " + value + ": it needs a number of seconds above 0";
+  return {
+      {"--set", &a.overrides, "key=value", "overrides a key of the scene, e.g. --set friction.coefficient=0.25"},
+      {"--output", &a.output, "DIR", "where results go (results/<scene>)"},
+      {"--time-limit", &a.limits.time_limit, "S",
+       "ends the run in order after S seconds, as SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2 and SIGXCPU do",
+       Rule::positive},
+      {"--checkpoint", &a.limits.checkpoint_interval, "S", "seconds between checkpoints [600]", Rule::positive},
+      {"--restart", &a.restart, "switch",
+       "goes on from the checkpoints of a run that ended early or was killed, if there are any"},
+      {"--verbose", &a.verbose, "switch", "prints every result before the short table; -v as well"},
+      {"--version", &a.version, "switch", "versions of squeal and of the libraries it runs on"},
+      {"--help", &a.help, "switch",
+       "this text; -help and -h as well; --help mesh: the keys of [mesh], or of another table"},
+      {"--reference", choice_of(a.reference), "PAGE",
+       "keys or results: the page of all keys, options and arguments, or of all results"},
+      {"--allow-scripts", &a.allow_scripts, "switch",
+       "lets the scene's geometry run commands and write files, as gmsh's statements can"},
+      {"--force", &a.force, "switch", "runs even where the forecast says more than a day, or more memory than is free"},
+      {"--dry-run", &a.dry_run, "switch",
+       "checks scene and mesh, prints the resolved scene, the model's size and the forecast, and stops"},
+  };
 }
-
-/// An argument of squeal's own: how it is written, what the help says, and what it does. Those with a value name it.
-struct Argument
-{
-  const char* name;
-  const char* value; // null: it takes none
-  const char* meaning;
-  void (*take)(Arguments& arguments, const std::string& value);
-};
-
-const std::array known_arguments = {
-    Argument{"--set", "key=value", "overrides a key of the scene, e.g. --set friction.coefficient=0.25",
-             [](Arguments& arguments, const std::string& value) { arguments.overrides.push_back(value); }},
-    Argument{"--output", "DIR", "where results go (results/<scene>)",
-             [](Arguments& arguments, const std::string& value) { arguments.output = value; }},
-    Argument{"--time-limit", "S",
-             "ends the run in order after S seconds, as SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2 and SIGXCPU do",
-             [](Arguments& arguments, const std::string& value)
-             { read_seconds("--time-limit", value, arguments.limits.time_limit, arguments.problem); }},
-    Argument{"--checkpoint", "S", "seconds between checkpoints [600]",
-             [](Arguments& arguments, const std::string& value)
-             { read_seconds("--checkpoint", value, arguments.limits.checkpoint_interval, arguments.problem); }},
-    Argument{"--restart", nullptr,
-             "goes on from the checkpoints of a run that ended early or was killed, if there are any",
-             [](Arguments& arguments, const std::string&) { arguments.restart = true; }},
-    Argument{"--verbose", nullptr, "prints every result before the short table; -v as well",
-             [](Arguments& arguments, const std::string&) { arguments.length = TableLength::full; }},
-    Argument{"--version", nullptr, "versions of squeal and of the libraries it runs on",
-             [](Arguments& arguments, const std::string&) { arguments.version = true; }},
-    Argument{"--help", nullptr, "this text; -help and -h as well; --help mesh: the keys of [mesh], or of another table",
-             [](Arguments& arguments, const std::string&) { arguments.help = true; }},
-    Argument{"--reference", "PAGE", "keys or results: the page of all keys, options and arguments, or of all results",
-             [](Arguments& arguments, const std::string& value)
-             {
-               arguments.reference = value;
-               if (value != "keys" && value != "results")
-                 arguments.problem = "--reference " + shortened(value) + ": it takes keys or results";
-             }},
-    Argument{"--allow-scripts", nullptr,
-             "lets the scene's geometry run commands and write files, as gmsh's statements can",
-             [](Arguments& arguments, const std::string&) { arguments.allow_scripts = true; }},
-    Argument{"--force", nullptr, "runs even where the forecast says more than a day, or more memory than is free",
-             [](Arguments& arguments, const std::string&) { arguments.force = true; }},
-    Argument{"--dry-run", nullptr,
-             "checks scene and mesh, prints the resolved scene, the model's size and the forecast, and stops",
-             [](Arguments& arguments, const std::string&) { arguments.dry_run = true; }}};
 
 std::vector<std::string> argument_names()
 {
+  Arguments unused;
   std::vector<std::string> names;
-  for (const Argument& known : known_arguments) names.emplace_back(known.name);
+  for (const SceneKey& known : keys_of(unused)) names.push_back(known.name);
   return names;
+}
+
+bool is_switch(const SceneKey& argument)
+{
+  return std::holds_alternative<bool*>(argument.target);
+}
+
+/// "--output DIR"
+std::string form_of(const SceneKey& argument)
+{
+  return argument.name + (is_switch(argument) ? "" : " " + argument.unit);
+}
+
+/// Whether it can be the name of a tool: letters alone, so that no scene with a folder or an ending is mistaken.
+bool is_plain_word(const std::string& word)
+{
+  return !word.empty() && word.find_first_not_of("abcdefghijklmnopqrstuvwxyz") == std::string::npos;
 }
 
 /// Whether a word asks for a number of ranks, which only the launcher can give.
@@ -128,21 +121,25 @@ Arguments take_arguments(int& argc, char** argv)
   Arguments arguments;
   arguments.program = shell_word(argv[0]);
   arguments.command = command_of(argc, argv);
+  const SceneKeys keys = keys_of(arguments);
   int kept = 1;
   for (int i = 1; i < argc; ++i)
   {
     const std::string given = argv[i], word = long_form(given);
-    const auto known = std::ranges::find_if(known_arguments, [&](const Argument& one) { return word == one.name; });
-    if (known != known_arguments.end() && !known->value)
-    {
-      known->take(arguments, {});
-      if (arguments.help && arguments.section.empty() && i + 1 < argc && argv[i + 1][0] != '-')
-        arguments.section = argv[++i];
-    }
-    else if (known != known_arguments.end() && i + 1 < argc)
-      known->take(arguments, argv[++i]);
-    else if (known != known_arguments.end())
+    const auto known = std::ranges::find(keys, word, &SceneKey::name);
+    if (known != keys.end() && !is_switch(*known) && i + 1 == argc)
       arguments.problem = word + " needs a value: squeal -help lists the arguments";
+    else if (known != keys.end())
+      try
+      {
+        set_by_word("argument", *known, is_switch(*known) ? "" : argv[++i]);
+        if (known->name == "--help" && arguments.section.empty() && i + 1 < argc && argv[i + 1][0] != '-')
+          arguments.section = argv[++i];
+      }
+      catch (const Error& error)
+      {
+        arguments.problem = error.what();
+      }
     else if (word.starts_with("--") || asks_for_ranks(word))
       arguments.problem = unknown_argument(word);
     else if (arguments.scene.empty() && word[0] != '-' && (word.ends_with(".toml") || is_scene_folder(word)))
@@ -158,22 +155,36 @@ Arguments take_arguments(int& argc, char** argv)
 
 std::string argument_reference()
 {
+  Arguments unused;
   std::string text;
-  for (const Argument& known : known_arguments)
-  {
-    const std::string name = std::string(known.name) + (known.value ? std::string(" ") + known.value : "");
-    text += format("  %-17s %s\n", name.c_str(), known.meaning);
-  }
+  for (const SceneKey& known : keys_of(unused))
+    text += format("  %-17s %s\n", form_of(known).c_str(), known.meaning.c_str());
   return text;
 }
 
 std::string argument_page()
 {
+  Arguments unused;
   std::string rows = markdown_head({"argument", "meaning"});
-  for (const Argument& known : known_arguments)
-    rows +=
-        markdown_row({markdown_code(known.name + (known.value ? std::string(" ") + known.value : "")), known.meaning});
+  for (const SceneKey& known : keys_of(unused)) rows += markdown_row({markdown_code(form_of(known)), known.meaning});
   return rows;
+}
+
+void become_tool(int argc, char** argv)
+{
+  namespace fs = std::filesystem;
+  if (argc < 2 || !is_plain_word(argv[1]) || is_scene_folder(argv[1])) return;
+  std::error_code code;
+  const fs::path program = fs::read_symlink("/proc/self/exe", code), prefix = program.parent_path().parent_path();
+  for (const fs::path& folder : {prefix / "tools", prefix / "share/squeal/tools"})
+  {
+    const fs::path tool = folder / argv[1];
+    if (!is_file(tool) || access(tool.c_str(), X_OK) != 0) continue;
+    setenv("SQUEAL", program.c_str(), 0);
+    execv(tool.c_str(), argv + 1);
+    std::fprintf(stderr, "squeal: error: %s cannot be run: %s\n", tool.c_str(), std::strerror(errno));
+    std::exit(1);
+  }
 }
 
 } // namespace squeal

@@ -1,5 +1,3 @@
-#include "squeal/given_options.hpp"
-
 #include "squeal/arguments.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/options.hpp"

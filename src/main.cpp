@@ -3,10 +3,8 @@
 #include "squeal/base/checkpoint.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/forecast.hpp"
-#include "squeal/given_options.hpp"
 #include "squeal/report/results_folder.hpp"
 #include "squeal/run.hpp"
-#include "squeal/tools.hpp"
 
 #include <algorithm>
 #include <cinttypes>
@@ -148,7 +146,7 @@ std::string request_text(const Scene& scene, const std::vector<std::filesystem::
 {
   std::string text =
       format("squeal %s on %d ranks\n", SQUEAL_VERSION, ranks_of(PETSC_COMM_WORLD)) + resolved_scene(scene);
-  for (const Option& option : options_of(options)) text += option.name + " " + value_of(option) + "\n";
+  for (const SceneKey& option : options_of(options)) text += option.name + " " + word_of_value(option) + "\n";
   for (const std::filesystem::path& file : inputs)
   {
     if (file == scene.file || !is_file(file)) continue;
@@ -171,7 +169,7 @@ int run_program(const Arguments& arguments)
     std::printf("options come from the command line and from the variable PETSC_OPTIONS\n");
   ProgramOptions options = read_program_options(comm);
   options.force = arguments.force;
-  options.length = arguments.length;
+  options.length = arguments.verbose ? TableLength::full : TableLength::brief;
   options.program = arguments.program;
   options.command = arguments.command;
   Scene scene;
@@ -276,13 +274,13 @@ int main(int argc, char** argv)
   end_with_launcher();
   const int rank = rank_of(PETSC_COMM_WORLD);
   if (arguments.help && !arguments.section.empty()) return rank != 0 || print_section(arguments.section) ? 0 : 1;
-  if (arguments.help || arguments.version || !arguments.reference.empty())
+  if (arguments.help || arguments.version || arguments.reference != ReferencePage::none)
   {
     if (rank == 0)
-      arguments.help                     ? print_help()
-      : arguments.version                ? print_versions()
-      : arguments.reference == "results" ? print_result_page()
-                                         : print_key_page();
+      arguments.help                                  ? print_help()
+      : arguments.version                             ? print_versions()
+      : arguments.reference == ReferencePage::results ? print_result_page()
+                                                      : print_key_page();
     return 0;
   }
   try

@@ -1,9 +1,9 @@
 #include "squeal/options.hpp"
 
+#include "squeal/arguments.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "squeal/base/markdown.hpp"
 #include "squeal/base/petsc.hpp"
-#include "squeal/given_options.hpp"
 #include "squeal/scene/scene.hpp"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ std::string nearest_option(const std::string& option)
 {
   ProgramOptions unused;
   std::vector<std::string> known;
-  for (const Option& candidate : options_of(unused)) known.push_back(candidate.name);
+  for (const SceneKey& candidate : options_of(unused)) known.push_back(candidate.name);
   for (const SolverPrefix& prefix : solver_prefixes) known.push_back(std::string("-") + prefix.text + "…");
   for (const std::string& key : scene_key_names())
   {
@@ -32,57 +32,63 @@ std::string nearest_option(const std::string& option)
 
 } // namespace
 
-OptionList options_of(ProgramOptions& options)
+SceneKeys options_of(ProgramOptions& options)
 {
   ContactSettings& contact = options.step.contact;
   ShootingOptions& shooting = options.cycle.shooting;
   return {
-      {"-factor", choice_of(options.factor.kind), Range::any,
+      {"-factor", choice_of(options.factor.kind), "word",
        "factorisation for the step and the equilibrium: supernodal or mumps, both on all ranks"},
-      {"-factor_limit", &options.factor.limit, Range::any,
+      {"-factor_limit", &options.factor.limit, "GB",
        "[GB] largest share of a rank in a supernodal factor; beyond it several ranks take MUMPS; -1: half of the free "
        "memory. Every run prints its choice, with what is foreseen"},
-      {"-modes_solver", choice_of(options.modes.solver), Range::any,
+      {"-modes_solver", choice_of(options.modes.solver), "word",
        "solver of larger problems: slices of frequency, or SLEPc's TOAR around zero (toar)"},
-      {"-modes_shapes", choice_of(options.modes.shapes), Range::any,
+      {"-modes_shapes", choice_of(options.modes.shapes), "word",
        "modes whose shapes fields.h5 holds: the unstable ones, or all"},
-      {"-transient_refuse", &options.step.refuse, Range::any,
+      {"-transient_refuse", &options.step.refuse, "switch",
        "false: march even where theta and the step falsify growth rates"},
-      {"-transient_contact_solver", choice_of(contact.solver), Range::any,
+      {"-transient_contact_solver", choice_of(contact.solver), "word",
        "block Gauss-Seidel, or the projection fixed point (fixed_point)"},
-      {"-transient_contact_tolerance", &contact.tolerance, Range::positive,
+      {"-transient_contact_tolerance", &contact.tolerance, "-",
        "largest natural map of a pair over the largest reaction; dear periods of shooting that are still far from the "
-       "cycle take up to 1e-6"},
-      {"-transient_contact_rho", &contact.rho, Range::below_two,
-       "step of the fixed point over 1/lambda_max(W); 0: chosen by the program"},
-      {"-cycle_samples", &options.cycle.samples, Range::natural,
-       "number of displacements over the last period in fields.h5"},
-      {"-reduced_modes", &options.cycle.reduced_modes, Range::natural,
-       "largest number of complex modes of a reduced model: the followed one and the nearest in frequency"},
-      {"-cycle_subspace_newtons", &shooting.subspace_newtons, Range::not_negative,
-       "Newton iterations on the period and the paper's six amplitudes; 0: they are not tried"},
-      {"-cycle_finish", choice_of(shooting.finish), Range::any, "finish in the full space: multisecant or none"},
-      {"-cycle_max_periods", &shooting.max_periods, Range::not_negative,
-       "periods that one search integrates at most; another number of steps a period is another search"},
-      {"-cycle_free_periods", &shooting.free_periods, Range::not_negative,
-       "largest number of periods integrated freely while shooting finds no cycle that attracts"},
-      {"-cycle_multipliers", &shooting.multipliers, Range::any,
+       "cycle take up to 1e-6",
+       Rule::positive},
+      {"-transient_contact_rho", &contact.rho, "-",
+       "step of the fixed point over 1/lambda_max(W); 0: chosen by the program", Rule::below_two},
+      {"-cycle_samples", &options.cycle.samples, "-", "number of displacements over the last period in fields.h5",
+       Rule::positive},
+      {"-reduced_modes", &options.cycle.reduced_modes, "-",
+       "largest number of complex modes of a reduced model: the followed one and the nearest in frequency",
+       Rule::positive},
+      {"-cycle_subspace_newtons", &shooting.subspace_newtons, "-",
+       "Newton iterations on the period and the paper's six amplitudes; 0: they are not tried", Rule::not_negative},
+      {"-cycle_finish", choice_of(shooting.finish), "word", "finish in the full space: multisecant or none"},
+      {"-cycle_max_periods", &shooting.max_periods, "-",
+       "periods that one search integrates at most; another number of steps a period is another search",
+       Rule::not_negative},
+      {"-cycle_free_periods", &shooting.free_periods, "-",
+       "largest number of periods integrated freely while shooting finds no cycle that attracts", Rule::not_negative},
+      {"-cycle_multipliers", &shooting.multipliers, "-",
        "columns of the exact tangent that the search for Floquet multipliers may take; 0: none; -1: as many as it "
        "needs, within limits. A number bounds the columns of the whole matrix or of a search"},
-      {"-cycle_watched_periods", &shooting.watched_periods, Range::any,
+      {"-cycle_watched_periods", &shooting.watched_periods, "-",
        "periods integrated from beside the cycle found, 3 % of its fluctuation along the fastest motion, to see it "
        "grow or decay; again from a tenth and a hundredth of that where growth and multiplier differ; below 0: where "
        "that decides what a bar leaves open, at most 200, as the search took or as is affordable"},
-      {"-settled_periods", &options.settled.periods, Range::not_negative,
+      {"-settled_periods", &options.settled.periods, "-",
        "largest number of periods integrated to see what a motion settles on where no cycle attracts; 0: 2048, or 512 "
-       "where periods are dear"},
-      {"-settled_exponents", &options.settled.exponents, Range::natural,
-       "number of Lyapunov exponents of a settled motion"},
-      {"-sweep_groups", &options.sweep.groups, Range::not_negative,
+       "where periods are dear",
+       Rule::not_negative},
+      {"-settled_exponents", &options.settled.exponents, "-", "number of Lyapunov exponents of a settled motion",
+       Rule::positive},
+      {"-sweep_groups", &options.sweep.groups, "-",
        "groups of ranks that share the points, at most one a rank or a point; 0: chosen so that each has four points, "
-       "and memory for a model of its own"},
-      {"-response_tolerance", &options.response.tolerance, Range::positive,
-       "geometric mean of the residual forces of the responses and of the transposed problem, over a unit force"},
+       "and memory for a model of its own",
+       Rule::not_negative},
+      {"-response_tolerance", &options.response.tolerance, "-",
+       "geometric mean of the residual forces of the responses and of the transposed problem, over a unit force",
+       Rule::positive},
   };
 }
 
@@ -97,8 +103,8 @@ std::string problem_of_option_name(const std::string& name)
 {
   const std::string option = "-" + name;
   ProgramOptions unused;
-  const OptionList own = options_of(unused);
-  const bool known = std::ranges::find(own, option, &Option::name) != own.end() || solver_prefix_of(name);
+  const SceneKeys own = options_of(unused);
+  const bool known = std::ranges::find(own, option, &SceneKey::name) != own.end() || solver_prefix_of(name);
   return known ? "" : "unknown option " + shortened(option) + "; " + nearest_option(option.substr(0, 60));
 }
 
@@ -106,8 +112,8 @@ std::string option_reference()
 {
   ProgramOptions standard;
   std::string text;
-  for (const Option& option : options_of(standard))
-    text += format("  %-36s%s [%s]\n", option.name.c_str(), option.meaning.c_str(), value_of(option).c_str());
+  for (const SceneKey& option : options_of(standard))
+    text += format("  %-36s%s [%s]\n", option.name.c_str(), option.meaning.c_str(), word_of_value(option).c_str());
   return text;
 }
 
@@ -115,11 +121,12 @@ std::string option_page()
 {
   ProgramOptions standard;
   std::string text = markdown_head({"option", "default", "values", "meaning"});
-  for (const Option& option : options_of(standard))
+  for (const SceneKey& option : options_of(standard))
   {
     std::string values;
-    for (const char* one : choices_of(option)) values += (values.empty() ? "" : ", ") + markdown_code(one);
-    text += markdown_row({markdown_code(option.name), markdown_code(value_of(option)), values, option.meaning});
+    if (const auto* choice = std::get_if<Choice>(&option.target))
+      for (const char* one : choice->words) values += (values.empty() ? "" : ", ") + markdown_code(one);
+    text += markdown_row({markdown_code(option.name), markdown_code(word_of_value(option)), values, option.meaning});
   }
   return text;
 }
@@ -128,7 +135,17 @@ ProgramOptions read_program_options(MPI_Comm comm)
 {
   ProgramOptions options;
   check(PetscOptionsClearValue(nullptr, "-skip_petscrc")); // the program's own, not to be asked for again
-  on_every_rank(comm, [&] { read_options(options_of(options)); });
+  on_every_rank(comm,
+                [&]
+                {
+                  for (const SceneKey& option : options_of(options))
+                  {
+                    char word[256] = "";
+                    PetscBool given = PETSC_FALSE;
+                    check(PetscOptionsGetString(nullptr, nullptr, option.name.c_str(), word, sizeof word, &given));
+                    if (given) set_by_word("option", option, word);
+                  }
+                });
   constexpr double part = 0.5; // of the free memory: the rest is for matrices, W and reduced models
   options.factor.by_memory = 1e-9 * part * free_memory(comm) / ranks_of(comm);
   options.factor.known = no_analyses();

@@ -4,6 +4,7 @@
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/cycle/options.hpp"
 #include "squeal/report/report.hpp"
+#include "squeal/scene/described.hpp"
 #include "squeal/settled/motion.hpp"
 #include "squeal/study/response.hpp"
 #include "squeal/study/sweep.hpp"
@@ -28,7 +29,8 @@ struct ProgramOptions
   ResponseOptions response;
 };
 
-OptionList options_of(ProgramOptions& options);
+/// The options of squeal's own, bound to their members, whose initialisers are the defaults.
+SceneKeys options_of(ProgramOptions& options);
 
 /// A prefix of options, and the stage in which the object behind it works.
 struct SolverPrefix
@@ -58,7 +60,7 @@ std::string option_reference();
 std::string option_page();
 
 /// The options of PETSc's database. Collective. Error: a value that an option does not take. Names are checked before
-/// PETSc starts (squeal/given_options.hpp).
+/// PETSc starts (squeal/arguments.hpp).
 ProgramOptions read_program_options(MPI_Comm comm);
 
 /// After the stages, before their results are published; collective. Error: an option of a solver object that nobody

@@ -89,28 +89,18 @@ void turn_shells(SurfaceContact& c)
   if (!turn_shell(stator, rotor)) (void)turn_shell(rotor, stator);
 }
 
-/// Throws Error if the surfaces are joined.
-void check_apart(const SurfaceContact& c)
-{
-  const std::size_t shared = shared_nodes(c.slave, c.master);
-  if (shared == 0) return;
-  throw Error("contact surfaces '" + c.contact.rotor + "' and '" + c.contact.stator + "' share " +
-              std::to_string(shared) +
-              " nodes, so the bodies are joined there: give each body its own copy of the surface and its nodes");
-}
-
 [[noreturn]] void fail_inside(const SurfaceContact& c, double depth, const Vec3& at)
 {
   throw Error(name_of(c.contact) + format("the stator is %.4g m inside the rotor at ", depth) + text_of(at) +
               ": correct the mesh, or the normal, which points out of the rotor");
 }
 
-/// Throws Error that says why the surfaces do not meet anywhere.
-[[noreturn]] void fail_to_meet(const SurfaceContact& c)
+/// Throws Error for surfaces that do not meet or that penetrate each other.
+void check_meeting(const SurfaceContact& c, const SlaveRows& rows)
 {
-  OverlapLimits wide = limits_of(c);
-  wide.search = c.size();
-  const OverlapFindings findings = dual_rows(c.slave, c.master, wide).findings;
+  const OverlapFindings& findings = rows.findings;
+  if (findings.deepest > 0) fail_inside(c, findings.deepest, findings.deepest_at);
+  if (rows.meet()) return;
   const std::string surfaces = name_of(c.contact);
   if (findings.nearest < 0) fail_inside(c, -findings.nearest, findings.nearest_at);
   if (findings.nearest > 0)
@@ -123,14 +113,6 @@ void check_apart(const SurfaceContact& c)
     throw Error(surfaces + "both surfaces look the same way at " + text_of(findings.same_way_at) +
                 ": name the faces that look at each other");
   throw Error(surfaces + "no face of one is opposite a face of the other: correct the names or the mesh");
-}
-
-/// Throws Error for surfaces that do not meet or that penetrate each other.
-void check_meeting(const SurfaceContact& c, const SlaveRows& rows)
-{
-  const OverlapFindings& findings = rows.findings;
-  if (findings.deepest > 0) fail_inside(c, findings.deepest, findings.deepest_at);
-  if (std::find(rows.covered.begin(), rows.covered.end(), 1) == rows.covered.end()) fail_to_meet(c);
 }
 
 /// Whether supports and rigid bodies hold a node along its normal.
@@ -236,7 +218,9 @@ void add_surface_pairs(const Mesh& mesh, const Scene& scene, int index, ContactP
                        stator = contact_surface(mesh, contact.stator, "contact");
   const bool stator_is_slave = contact.slave == SlaveSide::stator;
   SurfaceContact c{mesh, contact, stator_is_slave ? stator : rotor, stator_is_slave ? rotor : stator};
-  check_apart(c);
+  if (const std::string shared = share_text(c.slave, c.master); !shared.empty())
+    throw Error("contact surfaces '" + contact.rotor + "' and '" + contact.stator + "' " + shared +
+                ": give each body its own copy of the surface and its nodes");
   turn_shells(c);
   SlaveRows rows = dual_rows(c.slave, c.master, limits_of(c));
   check_meeting(c, rows);

@@ -138,36 +138,24 @@ Box box_of(const PlacedFace& face, double margin)
 }
 
 /// Faces by their boxes.
-class FaceTree
+using FaceTree = geometry::index::rtree<std::pair<Box, int>, geometry::index::quadratic<16>>;
+
+FaceTree tree_of(const std::vector<PlacedFace>& faces)
 {
-public:
-  explicit FaceTree(const std::vector<PlacedFace>& faces)
-  {
-    std::vector<std::pair<Box, int>> boxes;
-    for (std::size_t f = 0; f < faces.size(); ++f)
-    {
-      boxes.emplace_back(box_of(faces[f], 0), static_cast<int>(f));
-      slack_ = std::max(slack_, faces[f].slack);
-    }
-    tree_ = {boxes.begin(), boxes.end()};
-  }
+  std::vector<std::pair<Box, int>> boxes;
+  for (const PlacedFace& face : faces) boxes.emplace_back(box_of(face, 0), static_cast<int>(boxes.size()));
+  return {boxes.begin(), boxes.end()};
+}
 
-  /// The faces whose boxes come within the limits of this face's, ascending.
-  std::vector<int> near(const PlacedFace& face, const OverlapLimits& limits) const
-  {
-    const double margin =
-        std::max(limits.search, limits.closes ? limits.rounding + face.slack + slack_ : limits.distance);
-    std::vector<int> found;
-    for (auto it = tree_.qbegin(geometry::index::intersects(box_of(face, margin))); it != tree_.qend(); ++it)
-      found.push_back(it->second);
-    std::sort(found.begin(), found.end());
-    return found;
-  }
-
-private:
-  double slack_ = 0; // largest of all faces
-  geometry::index::rtree<std::pair<Box, int>, geometry::index::quadratic<16>> tree_;
-};
+/// The faces whose boxes come within `margin` of this face's, ascending.
+std::vector<int> near(const FaceTree& tree, const PlacedFace& face, double margin)
+{
+  std::vector<int> found;
+  for (auto it = tree.qbegin(geometry::index::intersects(box_of(face, margin))); it != tree.qend(); ++it)
+    found.push_back(it->second);
+  std::sort(found.begin(), found.end());
+  return found;
+}
 
 /// Adds up the weights of each node.
 void merge(std::vector<PairNode>& nodes)
@@ -247,13 +235,6 @@ ContactSurface contact_surface(const Mesh& mesh, const std::string& name, const 
   return surface;
 }
 
-std::size_t shared_nodes(const ContactSurface& a, const ContactSurface& b)
-{
-  std::vector<int> shared;
-  std::ranges::set_intersection(a.nodes, b.nodes, std::back_inserter(shared));
-  return shared.size();
-}
-
 bool turn_shell(ContactSurface& turned, const ContactSurface& other)
 {
   if (!turned.placed.front().two_sided) return false;
@@ -280,16 +261,22 @@ bool turn_shell(ContactSurface& turned, const ContactSurface& other)
   return true;
 }
 
-SlaveRows dual_rows(const ContactSurface& slave, const ContactSurface& master, const OverlapLimits& limits)
+namespace
+{
+
+SlaveRows covered_rows(const ContactSurface& slave, const ContactSurface& master, const OverlapLimits& limits)
 {
   constexpr double sliver = 1e-8; // share of a face: the rounding of its inverse Gram matrix is 1e-16 over this share
-  const FaceTree tree(master.placed);
+  const FaceTree tree = tree_of(master.placed);
+  double slack = limits.rounding;
+  for (const PlacedFace& face : master.placed) slack = std::max(slack, limits.rounding + face.slack);
   SlaveRows result{std::vector<SlaveRow>(slave.nodes.size()), std::vector<char>(slave.faces.size(), 0), {}, {}};
   double most_uncovered = 0;
   for (std::size_t f = 0; f < slave.faces.size(); ++f)
   {
     const PlacedFace& face = slave.placed[f];
-    const CoveredFace covered = cover_face(face, master.placed, tree.near(face, limits), limits, result.findings);
+    const double margin = std::max(limits.search, limits.closes ? slack + face.slack : limits.distance);
+    const CoveredFace covered = cover_face(face, master.placed, near(tree, face, margin), limits, result.findings);
     check_single_cover(covered, slave.faces[f], slave, master);
     std::vector<SlaveRow*> rows;
     for (const int node : nodes_of(slave.faces[f])) rows.push_back(&result.rows[slave.place_of(node)]);
@@ -306,6 +293,24 @@ SlaveRows dual_rows(const ContactSurface& slave, const ContactSurface& master, c
   set_slave_parts(slave, result.rows);
   for (SlaveRow& row : result.rows) merge(row.master);
   return result;
+}
+
+} // namespace
+
+SlaveRows dual_rows(const ContactSurface& slave, const ContactSurface& master, const OverlapLimits& limits)
+{
+  SlaveRows rows = covered_rows(slave, master, limits);
+  if (rows.meet()) return rows;
+  OverlapLimits wide = limits;
+  wide.search = std::max(slave.size, master.size);
+  return covered_rows(slave, master, wide);
+}
+
+std::string share_text(const ContactSurface& a, const ContactSurface& b)
+{
+  std::vector<int> shared;
+  std::ranges::set_intersection(a.nodes, b.nodes, std::back_inserter(shared));
+  return shared.empty() ? "" : "share " + std::to_string(shared.size()) + " nodes, so that the bodies are joined there";
 }
 
 std::vector<std::size_t> hand_over(const ContactSurface& slave, const std::vector<Vec3>& x,

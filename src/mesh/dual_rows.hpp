@@ -3,6 +3,8 @@
 #include "face_overlap.hpp"
 #include "squeal/mesh/contact_pairs.hpp"
 
+#include <algorithm>
+
 namespace squeal
 {
 
@@ -40,11 +42,14 @@ struct SlaveRows
   std::vector<SlaveRow> rows; // one a node of the slave surface
   std::vector<char> covered;  // of each slave face: whether it has an overlap
   Coverage coverage;
-  OverlapFindings findings;
+  OverlapFindings findings; // where nothing is covered, of all that is within the surfaces' size
+
+  /// Whether any slave face is covered.
+  bool meet() const { return std::ranges::find(covered, 1) != covered.end(); }
 };
 
-/// The number of nodes that two surfaces share.
-std::size_t shared_nodes(const ContactSurface& a, const ContactSurface& b);
+/// "share 4 nodes, so that the bodies are joined there"; empty where they share none.
+std::string share_text(const ContactSurface& a, const ContactSurface& b);
 
 /// Turns each patch of a shell, which may look to either side, to oppose the other surface. Returns false for a
 /// solid's.

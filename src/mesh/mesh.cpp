@@ -1,4 +1,5 @@
-/// The mesh of a scene: from its file, with the scene's points and reference points.
+/// The mesh of a scene: from its file, with the scene's points and reference points; what drives its contacts; axes of
+/// local frames.
 ///
 /// A superelement's retained nodes are those of the mesh at the same places. Its modal coordinates are carried by nodes
 /// of its own, six a node.
@@ -6,8 +7,10 @@
 
 #include "squeal/base/error.hpp"
 #include "squeal/base/packed.hpp"
+#include "squeal/mesh/frames.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/row_motions.hpp"
+#include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>
 #include <array>
@@ -238,6 +241,73 @@ void broadcast_mesh(Mesh& mesh, MPI_Comm comm)
   broadcast_packed(mesh.points, comm);
   broadcast_packed(mesh.beams, comm);
   broadcast_packed(mesh.superelements, comm);
+}
+
+std::string part_of(const Scene& scene, const Mesh& mesh, const std::string& surface)
+{
+  if (mesh.points.contains(surface)) return surface;
+  const auto faces = mesh.surfaces.find(surface);
+  if (faces == mesh.surfaces.end() || faces->second.empty()) return {};
+  const std::span<const int> face = nodes_of(faces->second.front());
+  for (const Element& element : mesh.elements)
+  {
+    const std::span<const int> nodes = nodes_of(element);
+    if (std::ranges::all_of(face, [&](int node) { return std::ranges::find(nodes, node) != nodes.end(); }))
+      return scene.parts[static_cast<std::size_t>(element.part)].name;
+  }
+  return {};
+}
+
+std::vector<int> rotors_of_contacts(const Scene& scene, const Mesh& mesh)
+{
+  std::vector<int> rotors;
+  const auto rotor_of = [&](const std::string& surface)
+  {
+    const auto rotor = std::ranges::find(scene.rotors, part_of(scene, mesh, surface), &Rotor::part);
+    return rotor == scene.rotors.end() ? -1 : static_cast<int>(rotor - scene.rotors.begin());
+  };
+  for (const Contact& contact : scene.contacts)
+  {
+    rotors.push_back(rotor_of(contact.rotor));
+    if (const int other = rotor_of(contact.stator); other >= 0 && rotors.back() < 0)
+      throw Error("[[contact]] of " + contact.stator + " on " + contact.rotor + ": [[rotor]] " +
+                  scene.rotors[static_cast<std::size_t>(other)].part + " has the surface " + contact.stator +
+                  ", which the contact names for its stator: exchange rotor and stator");
+  }
+  return rotors;
+}
+
+Eigen::Matrix3d axes_at(const Frame& frame, const Vec3& place, const std::string& user)
+{
+  Vec3 first = frame.axis_1, second = frame.axis_2;
+  if (frame.cylinder)
+  {
+    constexpr double rounding = 1e-9; // of the distances to the origin
+    const auto& [axis, centre] = *frame.cylinder;
+    const Vec3 arm = place - centre, radius = arm - dot(arm, axis) * axis;
+    if (norm(radius) <= rounding * std::max(norm(place), norm(centre)))
+      throw Error(user + format(": (%g, %g, %g) is on the axis of its cylinder, where no direction is radial: leave it "
+                                "out of the group, or move the axis",
+                                place[0], place[1], place[2]));
+    first = (1 / norm(radius)) * radius;
+    second = cross(axis, first);
+  }
+  const Vec3 third = cross(first, second);
+  Eigen::Matrix3d axes;
+  for (int c = 0; c < 3; ++c)
+  {
+    const auto i = static_cast<std::size_t>(c);
+    axes.row(c) << first[i], second[i], third[i];
+  }
+  return axes;
+}
+
+Eigen::Matrix<double, 6, 6> twice(const Eigen::Matrix3d& axes)
+{
+  Eigen::Matrix<double, 6, 6> both = Eigen::Matrix<double, 6, 6>::Zero();
+  both.topLeftCorner<3, 3>() = axes;
+  both.bottomRightCorner<3, 3>() = axes;
+  return both;
 }
 
 } // namespace squeal

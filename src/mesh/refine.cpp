@@ -19,6 +19,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <ranges>
 
 namespace squeal
 {
@@ -32,108 +33,79 @@ using Places = std::vector<Vector3d>; // natural coordinates
 /// gmsh's numbers of the lines of 2 and 3 nodes. Each is the first side of a quadrangle: nodes 0, 1 and 4.
 constexpr int line2 = 1, line3 = 8;
 
-/// Forms of elements, whatever their order. Simplices have their corners at 0 and at unit vectors.
-enum class Form
-{
-  line,
-  triangle,
-  quadrangle,
-  tetrahedron,
-  hexahedron,
-  wedge,
-};
+using Pair = std::array<int, 2>;
+
+/// The corners of a child, each in the middle of two of the parent's, which may be one.
+using Child = std::vector<Pair>;
 
 /// An element type of the file.
 struct CellType
 {
-  Form form{};
-  std::vector<std::array<int, 2>> sides{}; // with mid-side nodes, in their order
+  Places corners{};
+  std::vector<Pair> sides{}; // with mid-side nodes, in their order
   std::function<NodeValues(const Vector3d&)> values{};
+  std::vector<std::vector<Child>> middles{}; // children beside those of the corners; of a tetrahedron by the diagonal
 };
 
-std::optional<CellType> cell_type(int gmsh_type)
-{
-  const auto of_face = [](FaceShape shape)
-  { return [shape](const Vector3d& xi) { return shape_functions(shape, xi).N; }; };
-  const auto on_line = [](FaceShape quad, std::vector<int> nodes) {
-    return [=](const Vector3d& xi) -> NodeValues { return shape_functions(quad, {xi(0), -1, 0}).N(nodes); };
-  };
-  switch (gmsh_type)
-  {
-  case line2:
-    return CellType{Form::line, {}, on_line(FaceShape::quad4, {0, 1})};
-  case line3:
-    return CellType{Form::line, {{0, 1}}, on_line(FaceShape::quad8, {0, 1, 4})};
-  default:
-    break;
-  }
-  if (const auto face = face_shape(gmsh_type))
-  {
-    const int corners = corner_count(*face);
-    CellType type{corners == 3 ? Form::triangle : Form::quadrangle, {}, of_face(*face)};
-    if (node_count(*face) > corners)
-      for (int i = 0; i < corners; ++i) type.sides.push_back({i, (i + 1) % corners});
-    return type;
-  }
-  const auto shape = element_shape(gmsh_type);
-  if (!shape) return std::nullopt;
-  const auto sides = mid_sides(*shape);
-  const int corners = corner_count(*shape);
-  return CellType{corners == 8   ? Form::hexahedron
-                  : corners == 6 ? Form::wedge
-                                 : Form::tetrahedron,
-                  {sides.begin(), sides.end()},
-                  [shape = *shape](const Vector3d& xi) { return shape_functions(shape, xi).N; }};
-}
-
-Places corners_of(Form form)
-{
-  switch (form)
-  {
-  case Form::line:
-    return {{-1, 0, 0}, {1, 0, 0}};
-  case Form::triangle:
-    return {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  case Form::quadrangle:
-    return {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
-  case Form::tetrahedron:
-    return {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  case Form::hexahedron:
-    return {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {-1, 1, 1}};
-  default:
-    return {{0, 0, -1}, {1, 0, -1}, {0, 1, -1}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
-  }
-}
-
 /// Corners of an octahedron that are opposite each other, by the tetrahedron's sides that they halve.
-constexpr std::array<std::array<std::array<int, 2>, 2>, 3> diagonals = {
-    {{{{0, 1}, {2, 3}}}, {{{0, 2}, {1, 3}}}, {{{0, 3}, {1, 2}}}}};
+constexpr std::array<std::array<Pair, 2>, 3> diagonals = {{{{{0, 1}, {2, 3}}}, {{{0, 2}, {1, 3}}}, {{{0, 3}, {1, 2}}}}};
 
-/// Corners of the children that fill the middle. `diagonal`: of a tetrahedron's.
-std::vector<Places> middle_children(Form form, const Places& c, std::size_t diagonal)
+std::vector<std::vector<Child>> middles_of(int corners, int dimension)
 {
-  const auto half = [&](std::array<int, 2> side) -> Vector3d { return (c[side[0]] + c[side[1]]) / 2; };
-  const auto at_height = [](Vector3d place, double z) -> Vector3d { return {place(0), place(1), z}; };
-  const Places triangle =
-      form == Form::triangle || form == Form::wedge ? Places{half({0, 1}), half({1, 2}), half({2, 0})} : Places{};
-  std::vector<Places> children;
-  if (form == Form::triangle) children.push_back(triangle);
-  if (form == Form::wedge)
-    for (const double bottom : {-1., 0.})
-    {
-      Places& child = children.emplace_back();
-      for (const double z : {bottom, bottom + 1})
-        for (const Vector3d& place : triangle) child.push_back(at_height(place, z));
-    }
-  if (form == Form::tetrahedron)
+  const Child triangle = {{0, 1}, {1, 2}, {2, 0}}, lower = {{0, 1}, {1, 2}, {2, 0}, {0, 4}, {1, 5}, {2, 3}},
+              upper = {{0, 4}, {1, 5}, {2, 3}, {3, 4}, {4, 5}, {5, 3}};
+  std::vector<std::vector<Child>> middles;
+  if (corners == 3) middles.push_back({triangle});
+  if (corners == 6) middles.push_back({lower, upper});
+  if (corners != 4 || dimension != 3) middles.resize(1);
+  if (!middles.empty()) return middles;
+  for (std::size_t d = 0; d < 3; ++d)
   {
-    const auto& [from, to] = diagonals[diagonal];
-    const auto& [a, b] = diagonals[(diagonal + 1) % 3];
-    const auto& [d, e] = diagonals[(diagonal + 2) % 3];
-    const Places ring = {half(a), half(d), half(b), half(e)};
-    for (std::size_t i = 0; i < 4; ++i) children.push_back({half(from), half(to), ring[i], ring[(i + 1) % 4]});
+    const auto& [from, to] = diagonals[d];
+    const auto& [a, b] = diagonals[(d + 1) % 3];
+    const auto& [c, e] = diagonals[(d + 2) % 3];
+    const std::array ring = {a, c, b, e};
+    std::vector<Child>& octahedron = middles.emplace_back();
+    for (std::size_t i = 0; i < 4; ++i) octahedron.push_back({from, to, ring[i], ring[(i + 1) % 4]});
   }
-  return children;
+  return middles;
+}
+
+std::optional<CellType> cell_type(int gmsh_type, int dimension)
+{
+  static const Places brick = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
+                               {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}},
+                      simplex = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                      prism = {{0, 0, -1}, {1, 0, -1}, {0, 1, -1}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
+  CellType type;
+  int corners = 2; // of a line
+  if (gmsh_type == line2)
+    type.values = [](const Vector3d& xi) -> NodeValues { return shape_functions(FaceShape::quad4, xi).N.head(2); };
+  else if (gmsh_type == line3)
+  {
+    type.sides = {{0, 1}};
+    type.values = [](const Vector3d& xi) -> NodeValues {
+      return shape_functions(FaceShape::quad8, xi).N(std::array<Eigen::Index, 3>{0, 1, 4});
+    };
+  }
+  else if (const auto face = face_shape(gmsh_type))
+  {
+    corners = corner_count(*face);
+    for (int i = 0; i < node_count(*face) - corners; ++i) type.sides.push_back({i, (i + 1) % corners});
+    type.values = [shape = *face](const Vector3d& xi) { return shape_functions(shape, xi).N; };
+  }
+  else if (const auto solid = element_shape(gmsh_type))
+  {
+    corners = corner_count(*solid);
+    type.sides.assign(mid_sides(*solid).begin(), mid_sides(*solid).end());
+    type.values = [shape = *solid](const Vector3d& xi) { return shape_functions(shape, xi).N; };
+  }
+  else
+    return std::nullopt;
+  const Places& whole = corners == 6 ? prism : corners == 3 || (corners == 4 && dimension == 3) ? simplex : brick;
+  type.corners.assign(whole.begin(), whole.begin() + corners);
+  type.middles = middles_of(corners, dimension);
+  return type;
 }
 
 /// Weights of an element's nodes.
@@ -142,20 +114,23 @@ using LocalWeights = std::vector<std::pair<std::size_t, double>>;
 /// The nodes of each child.
 using Children = std::vector<std::vector<LocalWeights>>;
 
-Children children_of(const CellType& type, std::size_t diagonal)
+Children children_of(const CellType& type, const std::vector<Child>& middle)
 {
-  const Places corners = corners_of(type.form);
-  std::vector<Places> all;
-  for (const Vector3d& about : corners)
-    for (Places& child = all.emplace_back(); const Vector3d& corner : corners) child.push_back((corner + about) / 2);
-  for (Places& child : middle_children(type.form, corners, diagonal)) all.push_back(std::move(child));
+  const auto corners = static_cast<int>(type.corners.size());
+  std::vector<Child> all;
+  for (int about = 0; about < corners; ++about)
+    for (Child& child = all.emplace_back(); const int corner : std::views::iota(0, corners))
+      child.push_back({corner, about});
+  all.insert(all.end(), middle.begin(), middle.end());
   Children children;
-  for (Places& places : all)
+  for (const Child& child : all)
   {
+    Places places;
+    for (const auto& [a, b] : child) places.push_back((type.corners[a] + type.corners[b]) / 2);
     for (const auto& [a, b] : type.sides) places.push_back((places[a] + places[b]) / 2);
-    for (auto& child = children.emplace_back(); const Vector3d& place : places)
+    for (auto& nodes = children.emplace_back(); const Vector3d& place : places)
     {
-      LocalWeights& weights = child.emplace_back();
+      LocalWeights& weights = nodes.emplace_back();
       const NodeValues N = type.values(place);
       for (Eigen::Index i = 0; i < N.size(); ++i)
         if (N(i) != 0) weights.emplace_back(i, N(i));
@@ -164,10 +139,9 @@ Children children_of(const CellType& type, std::size_t diagonal)
   return children;
 }
 
-/// The shortest diagonal of the octahedron within a tetrahedron; 0 of other elements.
-std::size_t shortest_diagonal(Form form, std::span<const int> nodes, const std::vector<Vec3>& places)
+/// The shortest diagonal of the octahedron within a tetrahedron.
+std::size_t shortest_diagonal(std::span<const int> nodes, const std::vector<Vec3>& places)
 {
-  if (form != Form::tetrahedron) return 0;
   const auto at = [&](int corner) { return places[static_cast<std::size_t>(nodes[static_cast<std::size_t>(corner)])]; };
   const auto length = [&](const auto& diagonal)
   {
@@ -206,15 +180,14 @@ private:
 void divide(ElementBlock& block, const CellType& type, NewNodes& numbers, const std::vector<Vec3>& places)
 {
   std::vector<Children> children;
-  for (std::size_t d = 0; d < (type.form == Form::tetrahedron ? diagonals.size() : 1); ++d)
-    children.push_back(children_of(type, d));
+  for (const std::vector<Child>& middle : type.middles) children.push_back(children_of(type, middle));
   const auto n = static_cast<std::size_t>(block.nodes_per_element);
   const std::vector<int> parents = std::move(block.nodes);
   block.nodes = {};
   for (std::size_t first = 0; first < parents.size(); first += n)
   {
     const std::span nodes = std::span(parents).subspan(first, n);
-    for (const auto& child : children[shortest_diagonal(type.form, nodes, places)])
+    for (const auto& child : children[children.size() == 1 ? 0 : shortest_diagonal(nodes, places)])
       for (const LocalWeights& weights : child) block.nodes.push_back(numbers.number_of(nodes, weights));
   }
 }
@@ -239,7 +212,7 @@ void refine(FileMesh& mesh, int times)
     mesh.parents.clear();
     NewNodes numbers(mesh);
     for (ElementBlock& block : mesh.blocks)
-      if (const auto type = cell_type(block.type)) divide(block, *type, numbers, mesh.nodes);
+      if (const auto type = cell_type(block.type, block.dimension)) divide(block, *type, numbers, mesh.nodes);
   }
 }
 

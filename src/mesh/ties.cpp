@@ -26,16 +26,9 @@ std::string name_of(const Scene& scene, int tie)
   return tie < 0 ? "edge of a shell: " : name_of(scene.ties[static_cast<std::size_t>(tie)]);
 }
 
-void check_apart(const Tie& tie, const ContactSurface& slave, const ContactSurface& master)
-{
-  if (const std::size_t shared = shared_nodes(slave, master); shared > 0)
-    throw Error(name_of(tie) + "the surfaces share " + std::to_string(shared) +
-                " nodes, so that the parts are joined there: take the tie out");
-}
-
 void check_meeting(const Tie& tie, const SlaveRows& rows)
 {
-  if (std::find(rows.covered.begin(), rows.covered.end(), 1) != rows.covered.end()) return;
+  if (rows.meet()) return;
   const OverlapFindings& found = rows.findings;
   const Vec3& at = found.nearest_at;
   if (found.nearest != 0)
@@ -71,19 +64,15 @@ TiedNode solved(const Mesh& mesh, const SlaveRow& row, int node, int tie)
 void add_tie(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
 {
   ContactSurface slave = contact_surface(mesh, tie.slave, "tie"), master = contact_surface(mesh, tie.master, "tie");
-  check_apart(tie, slave, master);
+  if (const std::string shared = share_text(slave, master); !shared.empty())
+    throw Error(name_of(tie) + "the surfaces " + shared + ": take the tie out");
   if (!turn_shell(slave, master) && turn_shell(master, slave) && tie.reach > 0)
     throw Error(name_of(tie) +
                 "with a reach the shell must be the slave, whose nodes rotate: exchange slave and master");
   const double rounding = coincident * std::max(slave.size, master.size);
-  OverlapLimits limits{tie.reach, tie.reach == 0 ? rounding : std::max(rounding, tie.reach), tie.reach == 0,
-                       Eigen::Vector3d::Zero()};
-  SlaveRows rows = dual_rows(slave, master, limits);
-  if (std::find(rows.covered.begin(), rows.covered.end(), 1) == rows.covered.end())
-  {
-    limits.search = std::max(slave.size, master.size);
-    rows = dual_rows(slave, master, limits);
-  }
+  const OverlapLimits limits{tie.reach, tie.reach == 0 ? rounding : std::max(rounding, tie.reach), tie.reach == 0,
+                             Eigen::Vector3d::Zero()};
+  const SlaveRows rows = dual_rows(slave, master, limits);
   check_meeting(tie, rows);
   for (std::size_t i = 0; i < rows.rows.size(); ++i)
     if (const SlaveRow& row = rows.rows[i]; row.is_covered() && row.area >= light * row.whole)

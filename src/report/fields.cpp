@@ -224,33 +224,28 @@ public:
     on_rank_zero(comm_, [&] { work(*file_); });
   }
 
-  /// Writes a vector of degrees of freedom as nodal displacements.
-  void write(Vec u, const std::string& data)
-  {
-    const std::vector<double> values = nodal(u);
-    on_file([&](Hdf5File& file) { file.write(data, values, 3); });
-  }
+  /// Writes a vector of degrees of freedom as nodal displacements. `name`: of the field that ParaView shows at all
+  /// times; empty: it is none.
+  void write(Vec u, const std::string& data, const std::string& name) { write(nodal(u), data, name); }
 
-  /// Writes the displacement of nodes at rest, with what supports move them by, as a field for ParaView.
+  /// Writes the displacement of nodes at rest, with what supports move them by.
   void write_rest(Vec u, const std::string& data, const std::string& name)
   {
     std::vector<double> values = nodal(u);
     for (std::size_t i = 0; i < values.size(); ++i)
       values[i] += model_.dofs.shift_of(static_cast<PetscInt>(6 * (i / 3) + i % 3));
-    on_file([&](Hdf5File& file) { file.write(data, values, 3); });
-    layout.still.push_back({name, data, 3});
-  }
-
-  /// Writes a field that ParaView shows at all times.
-  void write_still(Vec u, const std::string& data, const std::string& name)
-  {
-    write(u, data);
-    layout.still.push_back({name, data, 3});
+    write(values, data, name);
   }
 
   Layout layout;
 
 private:
+  void write(const std::vector<double>& values, const std::string& data, const std::string& name)
+  {
+    on_file([&](Hdf5File& file) { file.write(data, values, 3); });
+    if (!name.empty()) layout.still.push_back({name, data, 3});
+  }
+
   /// x y z of every node [m] on rank 0, empty elsewhere.
   std::vector<double> nodal(Vec u) const
   {
@@ -292,8 +287,8 @@ void write_modes(Fields& fields, const Modes& modes)
     const std::string data = "modes/" + std::to_string(++number) + "/";
     const std::string name =
         format("%s %d, %ld Hz, ", grows ? "unstable mode" : "mode", number, std::lround(mode.frequency_hz()));
-    fields.write_still(mode.real, data + "real", name + "real part");
-    fields.write_still(mode.imaginary, data + "imaginary", name + "imaginary part");
+    fields.write(mode.real, data + "real", name + "real part");
+    fields.write(mode.imaginary, data + "imaginary", name + "imaginary part");
   }
 }
 
@@ -306,10 +301,7 @@ void write_motion_shapes(Fields& fields, const MotionShapes& shapes, Vec like)
   {
     copy_column(shapes.V, i, shape);
     const std::string number = std::to_string(i + 1), data = "settled/shape_" + number;
-    if (i < shown_shapes)
-      fields.write_still(shape, data, "shape " + number + " of the settled motion [kg^-1/2]");
-    else
-      fields.write(shape, data);
+    fields.write(shape, data, i < shown_shapes ? "shape " + number + " of the settled motion [kg^-1/2]" : "");
   }
 }
 
@@ -351,7 +343,7 @@ void write_fields(const Report& report, const Scene& scene, const Model& model, 
     write_motion_shapes(fields, report.motion.settled.shapes, model.structure.load);
   for (std::size_t i = 0; i < cycle.measured.displacements.size(); ++i)
   {
-    fields.write(cycle.measured.displacements[i], cycle_data(i));
+    fields.write(cycle.measured.displacements[i], cycle_data(i), "");
     fields.layout.time.push_back(sample_time(cycle, i));
   }
   fields.on_file(

@@ -1,3 +1,4 @@
+/// HDF5 files, and history.h5: transient, cycle and settled motion against time, and responses.
 #include "files.hpp"
 
 #include "squeal/base/error.hpp"
@@ -5,6 +6,7 @@
 #include "squeal/base/whole_file.hpp"
 
 #include <algorithm>
+#include <hdf5_hl.h>
 #include <utility>
 
 namespace squeal
@@ -14,33 +16,6 @@ namespace fs = std::filesystem;
 
 namespace
 {
-
-/// Closes an HDF5 object when it goes out of scope.
-class Handle
-{
-public:
-  Handle(hid_t id, herr_t (*close)(hid_t), const std::string& what) : id_(id), close_(close)
-  {
-    if (id < 0) throw Error("cannot write " + what + ": HDF5 refused it; is there memory for the file?");
-  }
-  ~Handle() { close_(id_); }
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-  operator hid_t() const { return id_; }
-
-private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
-
-void write_attribute(hid_t object, const std::string& name, const std::string& text)
-{
-  const Handle type(H5Tcopy(H5T_C_S1), H5Tclose, name);
-  H5Tset_size(type, text.size() + 1);
-  const Handle space(H5Screate(H5S_SCALAR), H5Sclose, name);
-  const Handle attribute(H5Acreate2(object, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, name);
-  if (H5Awrite(attribute, type, text.c_str()) < 0) throw Error("cannot write attribute " + name);
-}
 
 /// Whether a data set has this name, in which a <placeholder> stands for the rest of a group's name.
 bool is_of(std::string_view pattern, std::string_view name)
@@ -60,13 +35,14 @@ Hdf5File::Hdf5File(fs::path place, const std::string& run, std::span<const DataS
     : place_(std::move(place)), sets_(sets)
 {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); // failures become our errors instead of a printed stack
-  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, place_.string());
+  const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
   constexpr std::size_t growth = 1 << 20; // bytes that the memory grows by at a time
   H5Pset_fapl_core(access, growth, 0);    // 0: nothing on the disk
   id_ = H5Fcreate(place_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
-  if (id_ < 0) throw Error("cannot write " + place_.string() + ": HDF5 cannot make a file in memory");
-  write_attribute(id_, "format_version", std::to_string(format_version));
-  write_attribute(id_, "run", run);
+  H5Pclose(access);
+  if (id_ < 0 || H5LTset_attribute_string(id_, "/", "format_version", std::to_string(format_version).c_str()) < 0 ||
+      H5LTset_attribute_string(id_, "/", "run", run.c_str()) < 0)
+    throw Error("cannot write " + place_.string() + ": HDF5 cannot make a file in memory");
 }
 
 Hdf5File::~Hdf5File()
@@ -95,15 +71,14 @@ const DataSet& Hdf5File::set_of(const std::string& name) const
 void Hdf5File::write_data(const std::string& name, const std::vector<hsize_t>& shape, hid_t type, const void* data)
 {
   const DataSet& described = set_of(name);
-  const std::string what = place_.string() + ":" + name;
-  const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose, what);
-  H5Pset_create_intermediate_group(links, 1);
-  const Handle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose, what);
-  const Handle set(H5Dcreate2(id_, name.c_str(), type, space, links, H5P_DEFAULT, H5P_DEFAULT), H5Dclose, what);
-  if (shape.front() > 0 && H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
-    throw Error("cannot write " + what + ": HDF5 refused it; is there memory for the file?");
-  write_attribute(set, "unit", described.unit);
-  write_attribute(set, "meaning", described.meaning);
+  for (std::size_t at = 0; (at = name.find('/', at + 1)) != std::string::npos;)
+    if (const std::string group = name.substr(0, at); H5Lexists(id_, group.c_str(), H5P_DEFAULT) <= 0)
+      H5Gclose(H5Gcreate2(id_, group.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  if (H5LTmake_dataset(id_, name.c_str(), static_cast<int>(shape.size()), shape.data(), type,
+                       shape.front() > 0 ? data : nullptr) < 0 ||
+      H5LTset_attribute_string(id_, name.c_str(), "unit", described.unit) < 0 ||
+      H5LTset_attribute_string(id_, name.c_str(), "meaning", described.meaning) < 0)
+    throw Error("cannot write " + place_.string() + ":" + name + ": HDF5 refused it; is there memory for the file?");
 }
 
 std::string page_rows(std::span<const DataSet> sets)
@@ -111,6 +86,80 @@ std::string page_rows(std::span<const DataSet> sets)
   std::string rows;
   for (const DataSet& set : sets) rows += markdown_row({markdown_code(set.name), set.unit, set.meaning});
   return rows;
+}
+
+namespace
+{
+
+void write_group(Hdf5File& file, const std::string& group, const History& history, const Scene& scene)
+{
+  const auto write = [&](const std::string& name, const char*, const auto& series)
+  { file.write(group + "/" + name, series); };
+  for_each_series(write, history);
+  const std::size_t probes = std::min(scene.probes.size(), history.probes.size());
+  for (std::size_t i = 0; i < probes; ++i) write("probes/" + scene.probes[i].name, "m", history.probes[i]);
+}
+
+/// The motion on its shapes, one sample a row.
+void write_coordinates(Hdf5File& file, const SettledMotion& settled)
+{
+  const auto& coordinates = settled.shapes.coordinates;
+  if (coordinates.empty()) return;
+  std::vector<double> time, rows;
+  for (std::size_t i = 0; i < settled.shapes.squares.size(); ++i)
+  {
+    const auto every = static_cast<std::size_t>(settled.sampled_steps);
+    time.push_back(settled.history.time[(i + 1) * every - 1]);
+    for (const auto& coordinate : coordinates) rows.push_back(coordinate[i]);
+  }
+  file.write("settled/shapes/time", time);
+  file.write("settled/shapes/coordinate", rows, coordinates.size());
+}
+
+void write_statuses(Hdf5File& file, const std::vector<std::vector<ContactStatus>>& statuses)
+{
+  if (statuses.empty()) return;
+  std::vector<unsigned char> flat;
+  for (const auto& step : statuses)
+    for (const ContactStatus status : step) flat.push_back(static_cast<unsigned char>(status));
+  file.write("cycle/status", flat, statuses.front().size());
+}
+
+void write_response(Hdf5File& file, const Response& response, const Scene& scene)
+{
+  file.write("response/frequency", response.frequency_hz);
+  for (std::size_t i = 0; i < response.excitations.size(); ++i)
+    for (std::size_t j = 0; j < response.receptance[i].size(); ++j)
+    {
+      std::vector<double> flat;
+      for (const std::complex<double>& value : response.receptance[i][j])
+        flat.insert(flat.end(), {value.real(), value.imag()});
+      const std::string& driven = scene.probes[static_cast<std::size_t>(response.excitations[i])].name;
+      file.write("response/receptance/" + driven + "/" + scene.probes[j].name, flat, 2);
+    }
+}
+
+} // namespace
+
+void write_history(const Report& report, const Scene& scene, const std::filesystem::path& place)
+{
+  Hdf5File file(place, report.run, history_sets);
+  const auto& [cycle, fidelity, settled, followed, attempts] = report.motion;
+  if (has_run(report.transient.outcome)) write_group(file, "transient", report.transient.history, scene);
+  if (has_run(cycle.outcome))
+  {
+    write_group(file, "cycle", cycle.measured.history, scene);
+    write_statuses(file, cycle.measured.statuses);
+  }
+  if (has_run(settled.outcome))
+  {
+    write_group(file, "settled", settled.history, scene);
+    file.write("settled/spectrum/frequency", settled.examined.spectrum.frequency_hz);
+    file.write("settled/spectrum/amplitude", settled.examined.spectrum.amplitude);
+    if (!scene.matrices) write_coordinates(file, settled);
+  }
+  if (has_run(report.response.outcome)) write_response(file, report.response, scene);
+  file.keep();
 }
 
 } // namespace squeal

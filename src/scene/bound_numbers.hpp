@@ -37,16 +37,6 @@ double number_at(const Scene& scene, const std::string& key, const std::string& 
 /// Throws Error, with the place of the member, if the scene is none with this value of the number.
 void need_scene(const Scene& scene, const SceneNumber& number, const std::string& place, const std::string& label);
 
-/// Design points: a value of each key a point.
-struct DesignTable
-{
-  std::vector<std::string> keys;
-  std::vector<std::vector<double>> points;
-};
-
-/// Throws Error, with the line, for what is no number, for lines of another length and for a key that is there twice.
-DesignTable read_design_table(const std::filesystem::path& file);
-
 /// The shortest text that reads back as the same number.
 std::string text_of_number(double value);
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -29,13 +30,15 @@ Bounds bounds_of(Rule rule)
   switch (rule)
   {
   case Rule::positive:
-    return {0, infinity, true, "a positive number"};
+    return {0, infinity, true, "a positive number (above 0)"};
   case Rule::not_negative:
     return {0, infinity, false, "zero or a positive number"};
   case Rule::poisson:
     return {-1, 0.5, true, "a number above -1 and below 0.5"};
   case Rule::fraction:
     return {std::numeric_limits<double>::min(), 1, false, "a number above 0 and at most 1"};
+  case Rule::below_two:
+    return {0, std::nextafter(2, 0), false, "a number of 0 or above and below 2"};
   default:
     return {-infinity, infinity, false, "a finite number"};
   }
@@ -95,7 +98,7 @@ public:
     else if (value_.key.rule == Rule::file)
       problem = problem_of_file(target);
     if (!problem.empty())
-      throw Error(place_of(node) + ": " + value_.label + value_.key.name + " = " + text_of(node) + ": " + problem +
+      throw Error(place(node) + value_.key.name + " = " + text_of(node) + ": " + problem +
                   " (paths are relative to the scene file)");
   }
 
@@ -176,11 +179,16 @@ public:
   }
 
 private:
+  /// The place of a value with the label of its table.
+  std::string place(const toml::node& node) const
+  {
+    return (value_.place.empty() ? place_of(node) : value_.place) + ": " + value_.label;
+  }
+
   /// Throws Error for a value of the key that is not as expected.
   [[noreturn]] void fail(const toml::node& node, const std::string& expected) const
   {
-    refuse_value(value_.key, (value_.place.empty() ? place_of(node) : value_.place) + ": " + value_.label,
-                 text_of(node), expected);
+    refuse_value(value_.key, place(node), text_of(node), expected);
   }
 
   /// Throws Error for what is not finite, and where the third power would not be.
@@ -203,7 +211,7 @@ private:
     number(node);
     const auto value = node.value<std::int64_t>();
     if (!value || *value > std::numeric_limits<Integer>::max() || *value < std::numeric_limits<Integer>::min())
-      fail(node, "a whole number");
+      fail(node, "a whole number of at most " + std::to_string(std::numeric_limits<Integer>::max()));
     return static_cast<Integer>(*value);
   }
 
@@ -289,8 +297,7 @@ private:
   Error refusal(const toml::node& node, const std::string& given, const std::vector<std::string>& words,
                 const std::string& more) const
   {
-    return Error(place_of(node) + ": " + value_.label + value_.key.name + " = '" + given + "' is none of " +
-                 joined(words) + more);
+    return Error(place(node) + value_.key.name + " = '" + given + "' is none of " + joined(words) + more);
   }
 
   const ValuePlace& value_;
@@ -313,12 +320,40 @@ void read_value(const ValuePlace& value, const toml::node& node)
       value.key.target);
 }
 
+void set_by_word(const std::string& place, const SceneKey& key, const std::string& word)
+{
+  if (auto* const* list = std::get_if<std::vector<std::string>*>(&key.target)) return (*list)->push_back(word);
+  const char *const begin = word.data() + (word.starts_with('+') ? 1 : 0), *const end = word.data() + word.size();
+  const auto is_read = [&](auto& number)
+  {
+    const auto [stop, error] = std::from_chars(begin, end, number);
+    return error == std::errc() && stop == end;
+  };
+  const std::string no_label;
+  const std::filesystem::path no_folder;
+  const auto read = [&](const auto& value) { read_value({key, no_label, no_folder, place}, toml::value(value)); };
+  std::int64_t whole = 0;
+  double number = 0;
+  const bool is_switch = std::holds_alternative<bool*>(key.target),
+             takes_number = std::holds_alternative<double*>(key.target) || std::holds_alternative<int*>(key.target) ||
+                            std::holds_alternative<long*>(key.target);
+  if (is_switch && (word.empty() || word == "true" || word == "false"))
+    read(word != "false");
+  else if (takes_number && is_read(whole))
+    read(whole);
+  else if (takes_number && is_read(number))
+    read(number);
+  else
+    read(word);
+}
+
 std::string problem_of_number(Rule rule, double value)
 {
   const Bounds bounds = bounds_of(rule);
   const bool inside =
       bounds.open ? value > bounds.least && value < bounds.greatest : value >= bounds.least && value <= bounds.greatest;
-  if (!inside || !std::isfinite(value)) return bounds.text;
+  if (!std::isfinite(value)) return "a finite number";
+  if (!inside) return bounds.text;
   return std::abs(value) > largest_number ? "a number of at most 1e100 in size, so that powers of it are finite" : "";
 }
 

@@ -151,7 +151,8 @@ std::string rule_text(const SceneKey& key)
                                        "zero: none",
                                        "no negative xx, yy or zz",
                                        "existing file",
-                                       "existing folder"};
+                                       "existing folder",
+                                       "0 or above, below 2"};
   Words words;
   if (const auto* choice = std::get_if<Choice>(&key.target)) words = choice->words;
   if (const auto* start = std::get_if<StartTarget>(&key.target)) words = start->kind.words;
@@ -177,6 +178,13 @@ std::string page_table(const Printer& printer, const std::string& head, const st
 }
 
 } // namespace
+
+std::string word_of_value(const SceneKey& key)
+{
+  if (const auto* choice = std::get_if<Choice>(&key.target)) return choice->words[choice->get(choice->member)];
+  Scene none;
+  return Printer(none).value_text(key);
+}
 
 std::string resolved_scene(const Scene& scene)
 {

@@ -3,7 +3,7 @@
 ///     v = [1 - 3 xi^2 + 2 xi^3 + phi (1 - xi)]/(1 + phi) v_a + L [xi - 2 xi^2 + xi^3 + phi (xi - xi^2)/2]/(1 + phi)
 ///     t_a
 /// and alike at b. Stiffness is exact; the mass has the rotation of the sections.
-#include "beam_kernel.hpp"
+#include "kernels.hpp"
 
 #include "squeal/base/constants.hpp"
 #include "squeal/mesh/quadrature.hpp"

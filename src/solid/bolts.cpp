@@ -1,6 +1,6 @@
-#include "bolts.hpp"
+#include "contributions.hpp"
 
-#include "local_dofs.hpp"
+#include "squeal/base/disjoint_sets.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/shapes.hpp"
 
@@ -57,9 +57,9 @@ double height(const Mesh& mesh, int element, const Vec3& axis)
   return sum / static_cast<double>(nodes.size());
 }
 
-/// The side of each element at the section, 1 where the axis points to. They spread from the section's faces through
-/// all others. Throws Error where they meet: one can walk round the section within the material.
-std::map<int, int> sides_of(const Mesh& mesh, const Bolt& bolt, const std::vector<int>& section)
+/// The elements at the section on the side that the axis points to: those above its faces, and what is joined to them
+/// beside it. Throws Error where the sides meet: one can walk round the section within the material.
+std::vector<int> elements_above(const Mesh& mesh, const Bolt& bolt, const std::vector<int>& section)
 {
   const auto fail = [&](const std::string& why)
   {
@@ -67,41 +67,32 @@ std::map<int, int> sides_of(const Mesh& mesh, const Bolt& bolt, const std::vecto
                 ": name a surface across the whole shank, with elements of the shank on both sides");
   };
   const Around found = around(mesh, section);
-  std::map<int, int> side;
-  std::vector<int> open;
-  const auto set = [&](int element, int value)
-  {
-    const auto [place, is_new] = side.emplace(element, value);
-    if (is_new) open.push_back(element);
-    if (place->second != value) fail("does not cut the shank through: both of its sides are joined beside it");
-  };
-  const auto is_cut = [&](const Corners& face)
-  { return std::ranges::all_of(face, [&](int node) { return node < 0 || is_on(section, node); }); };
-  std::map<int, std::vector<int>> neighbours;
+  const auto place_of = [&](int element)
+  { return static_cast<int>(std::ranges::lower_bound(found.elements, element) - found.elements.begin()); };
+  DisjointSets patches(found.elements.size()); // joined by faces that are not of the section
+  std::vector<std::array<int, 2>> across;      // places of the elements below and above each face of the section
   for (const auto& [face, elements] : found.faces)
   {
     if (elements.size() != 2) continue;
-    const auto [low, high] =
-        std::minmax(elements[0], elements[1],
-                    [&](int a, int b) { return height(mesh, a, bolt.axis) < height(mesh, b, bolt.axis); });
-    if (is_cut(face))
-    {
-      set(low, -1);
-      set(high, 1);
-      continue;
-    }
-    neighbours[low].push_back(high);
-    neighbours[high].push_back(low);
+    int low = place_of(elements[0]), high = place_of(elements[1]);
+    if (height(mesh, elements[0], bolt.axis) > height(mesh, elements[1], bolt.axis)) std::swap(low, high);
+    if (std::ranges::all_of(face, [&](int node) { return node < 0 || is_on(section, node); }))
+      across.push_back({low, high});
+    else
+      patches.join(low, high);
   }
-  if (side.empty()) fail("has no face between two solid elements");
-  while (!open.empty())
-  {
-    const int element = open.back();
-    open.pop_back();
-    for (const int other : neighbours[element]) set(other, side.at(element));
-  }
-  if (side.size() < found.elements.size()) fail("has nodes of other solids");
-  return side;
+  if (across.empty()) fail("has no face between two solid elements");
+  std::set<int> below, above;
+  for (const auto& [low, high] : across) below.insert(patches.least(low)), above.insert(patches.least(high));
+  if (std::ranges::any_of(below, [&](int patch) { return above.contains(patch); }))
+    fail("does not cut the shank through: both of its sides are joined beside it");
+  std::vector<int> result;
+  for (const int element : found.elements)
+    if (const int patch = patches.least(place_of(element)); above.contains(patch))
+      result.push_back(element);
+    else if (!below.contains(patch))
+      fail("has nodes of other solids");
+  return result;
 }
 
 /// Throws Error for nodes that a contact or tie reads too: it would see one side of the section.
@@ -127,9 +118,8 @@ std::vector<Cut> cuts_of_section(const Bolt& bolt, const NumberedMesh& numbered,
   const std::vector<int> section = named_nodes(numbered.mesh, bolt.section, "bolt " + bolt.name);
   check_free(numbered.mesh, scene, bolt, section);
   std::vector<Cut> cuts;
-  for (const auto& [element, side] : sides_of(numbered.mesh, bolt, section))
+  for (const int element : elements_above(numbered.mesh, bolt, section))
   {
-    if (side < 0) continue;
     Cut cut{element_contribution(numbered, scene, static_cast<std::size_t>(element)), {}};
     cut.shift.setZero(static_cast<Eigen::Index>(cut.of.nodal_dofs.size()));
     for (Eigen::Index k = 0; k < cut.shift.size(); ++k)

@@ -1,6 +1,8 @@
 #pragma once
-/// Contributions, of which the matrices of a structure are the sum.
-#include "squeal/solid/dofs.hpp"
+/// Contributions, of which the matrices of a structure are the sum, and what each adds to matrices and vectors of the
+/// free degrees of freedom: T_e' A T_e and T_e' f, u_e = T_e q. Sections of bolts; parts that spin in the frame at rest
+/// (src/README.md, section 1.10).
+#include "squeal/solid/structure.hpp"
 
 #include <Eigen/Core>
 
@@ -28,5 +30,58 @@ std::vector<Contribution> lumped_contributions(const Mesh& mesh, const Scene& sc
 
 /// Contributions of the elements of a beam, from end to end.
 std::vector<Contribution> beam_contributions(const Mesh& mesh, const Scene& scene, std::size_t index);
+
+/// The first `components` degrees of freedom of each node.
+std::vector<PetscInt> nodal_dofs_of(std::span<const int> nodes, int components);
+
+std::vector<PetscInt> nodal_dofs_of(const Element& element);
+
+/// Returns the free degrees of freedom on which the nodal ones depend, ascending.
+std::vector<PetscInt> free_dofs(const DofMap& dofs, const std::vector<PetscInt>& nodal_dofs);
+
+/// An entry of T_e.
+struct LocalTerm
+{
+  Eigen::Index nodal = 0; // position in the nodal degrees of freedom
+  Eigen::Index free = 0;  // position in the free ones
+  double factor = 0;
+};
+
+/// T_e of some nodal degrees of freedom.
+struct LocalDofs
+{
+  std::vector<PetscInt> free; // ascending
+  std::vector<LocalTerm> terms;
+};
+
+LocalDofs local_dofs(const DofMap& dofs, const std::vector<PetscInt>& nodal_dofs);
+
+/// Adds T_e' A T_e; A of any symmetry.
+void add_matrix(Mat matrix, const LocalDofs& local, const Eigen::MatrixXd& A);
+
+/// Adds T_e' f.
+void add_vector(Vec vector, const LocalDofs& local, const Eigen::VectorXd& f);
+
+/// A contribution that a section cuts, and the motion of its nodal degrees of freedom that a unit of shortening adds to
+/// what it sees.
+struct Cut
+{
+  Contribution of;
+  Eigen::VectorXd shift;
+};
+
+/// The part of a bolt that its section cuts. A section of nodes cuts the elements on the side that the axis points to:
+/// they see its nodes moved against the axis. The mesh must be whole. Throws Error for a section that does not cut
+/// through a shank, and for nodes in a contact or tie.
+std::vector<Cut> cuts_of(const Bolt& bolt, const NumberedMesh& numbered, const Scene& scene);
+
+/// Adds G, and to K the centrifugal part with the stiffness of the centrifugal stress. M, C and K are assembled.
+/// Collective. Throws Error for a part that spins and is no solid of revolution
+/// about its axis.
+void add_spin(Structure& structure, const NumberedMesh& numbered, const Scene& scene);
+
+/// Ends the assembly of a matrix, or of a vector. Collective.
+void finish(Mat A);
+void finish(Vec x);
 
 } // namespace squeal

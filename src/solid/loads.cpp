@@ -3,12 +3,9 @@
 ///
 /// Beside T q a nodal degree of freedom may have a motion s that is known: what a support prescribes, or the shortening
 /// of a bolt, which the elements on one side of its section see. Its load is -T' K s; that of gravity is T' M a.
-#include "bolts.hpp"
 #include "contributions.hpp"
-#include "local_dofs.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 #include "squeal/mesh/shapes.hpp"
-#include "squeal/solid/structure.hpp"
 
 #include <algorithm>
 #include <set>
@@ -49,12 +46,6 @@ void check_acts(const DofMap& dofs, const std::vector<int>& nodes, const std::st
                      first == 0 ? "N" : "N m") +
               " acts on motions only that are held, so it would do nothing: free one of them, or remove the force" +
               (first == 0 ? "" : "; nodes of solids do not rotate: let a [[coupling]] or [[rigid_body]] take it"));
-}
-
-void end_assembly(Vec load)
-{
-  check(VecAssemblyBegin(load));
-  check(VecAssemblyEnd(load));
 }
 
 /// Nodes that carry modal coordinates of superelements, which gravity does not act on.
@@ -137,7 +128,7 @@ TightBolt bolt_of(const Bolt& bolt, const NumberedMesh& numbered, const Scene& s
     }
   };
   on_rank_zero(comm, add_cuts);
-  end_assembly(result.pull);
+  finish(result.pull);
   for (double* number : {&result.stiffness, &result.own}) MPI_Bcast(number, 1, MPI_DOUBLE, 0, comm);
   return result;
 }
@@ -167,7 +158,7 @@ Owned<Vec> assemble_load(const Mesh& mesh, const Scene& scene, const DofMap& dof
         add_pressure(load, dofs, mesh, face, pressure.value);
   };
   on_rank_zero(comm, add_all);
-  end_assembly(load);
+  finish(load);
   return load;
 }
 
@@ -181,7 +172,7 @@ void assemble_preload(Structure& structure, const NumberedMesh& numbered, const 
   on_rank_zero(comm, [&] { lumped = lumped_contributions(numbered.mesh, scene); });
   if (scene.gravity != Vec3{}) add_gravity(structure.preload, numbered, scene, lumped);
   on_rank_zero(comm, [&] { add_prescribed(structure.preload, numbered, scene, lumped); });
-  end_assembly(structure.preload);
+  finish(structure.preload);
   check(VecAXPY(structure.load, 1, structure.preload));
   for (const Bolt& bolt : scene.bolts) structure.bolts.push_back(bolt_of(bolt, numbered, scene, structure.load));
 }

@@ -38,12 +38,7 @@ Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_col
 
 std::pair<PetscInt, PetscInt> local_range(PetscInt count, MPI_Comm comm)
 {
-  return range_of(count, rank_of(comm), ranks_of(comm));
-}
-
-std::pair<PetscInt, PetscInt> range_of(PetscInt count, PetscInt rank, PetscInt ranks)
-{
-  const PetscInt size = count / ranks, rest = count % ranks;
+  const PetscInt rank = rank_of(comm), ranks = ranks_of(comm), size = count / ranks, rest = count % ranks;
   const PetscInt first = rank * size + std::min(rank, rest);
   return {first, first + size + (rank < rest ? 1 : 0)};
 }

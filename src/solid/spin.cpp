@@ -2,9 +2,8 @@
 ///     G = int rho (U' d - d' U) dV,     K_c = - int rho d' d dV,     K_sigma = int (grad U)' sigma (grad U) dV,
 /// with sigma the stress under the centrifugal force int rho d' v_0 dV. K_sigma and K_c cancel for rigid rotations,
 /// whatever the mesh, since sigma balances that force on the same functions and points.
-#include "spin.hpp"
+#include "contributions.hpp"
 
-#include "local_dofs.hpp"
 #include "squeal/algebra/pencil_factor.hpp"
 #include "squeal/mesh/shapes.hpp"
 #include "squeal/solid/element.hpp"
@@ -189,12 +188,6 @@ Eigen::VectorXd of_nodes(const LocalDofs& local, const std::vector<double>& u, s
   return result;
 }
 
-void finish(Mat A)
-{
-  check(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
-}
-
 } // namespace
 
 void add_spin(Structure& structure, const NumberedMesh& numbered, const Scene& scene)
@@ -222,8 +215,7 @@ void add_spin(Structure& structure, const NumberedMesh& numbered, const Scene& s
     add_vector(force, of.local, spin.force);
   }
   finish(structure.G);
-  check(VecAssemblyBegin(force));
-  check(VecAssemblyEnd(force));
+  finish(force);
   const std::vector<double> u = displacements(structure, force);
   for (const Spinning& of : elements)
   {

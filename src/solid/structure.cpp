@@ -1,16 +1,11 @@
 /// M, C, K and the load on the free degrees of freedom: sums of T_e' A_e T_e over contributions, u_e = T_e q.
 ///
-/// A contribution is that of an element, or lumped: a mass, spring, connector, beam or superelement. Every rank has the
-/// mesh, so that it counts the entries of its own rows exactly.
-/// Contributions to rows of other ranks are sent at the end of the assembly. All three matrices receive every
-/// contribution, zeros included, which gives them one pattern.
+/// A contribution is that of an element, or lumped: a mass, spring, connector, beam or superelement. Contributions to
+/// rows of other ranks are sent at the end of the assembly. All three matrices receive every contribution, zeros
+/// included, which gives them one pattern.
 #include "squeal/solid/structure.hpp"
 
 #include "contributions.hpp"
-#include "local_dofs.hpp"
-#include "spin.hpp"
-
-#include <algorithm>
 
 namespace squeal
 {
@@ -27,56 +22,37 @@ void add_contribution(const Structure& structure, const DofMap& dofs, const Cont
   if (structure.K_loss.get()) add_matrix(structure.K_loss, local, contribution.loss_factor * contribution.K);
 }
 
-/// Number of entries of each of this rank's rows, in the columns it owns and in the others.
-struct RowCounts
+/// Whether this rank adds the contribution of an element; rank 0 adds those of what is lumped.
+bool is_own(const NumberedMesh& numbered, std::size_t element, MPI_Comm comm)
 {
-  std::vector<PetscInt> own, other;
-};
-
-/// Counts the entries of rows where each clique of degrees of freedom fills all its rows and columns.
-RowCounts count_entries(const DofMap& dofs, const std::vector<std::vector<PetscInt>>& cliques)
-{
-  const PetscInt rows = dofs.last - dofs.first;
-  const auto owns = [&](PetscInt dof) { return dof >= dofs.first && dof < dofs.last; };
-  std::vector<std::vector<std::size_t>> cliques_of(rows);
-  for (std::size_t i = 0; i < cliques.size(); ++i)
-    for (const PetscInt dof : cliques[i])
-      if (owns(dof)) cliques_of[dof - dofs.first].push_back(i);
-  RowCounts counts{std::vector<PetscInt>(rows, 0), std::vector<PetscInt>(rows, 0)};
-  std::vector<PetscInt> last_row(dofs.size, -1); // the last row in which a column was counted
-  for (PetscInt row = 0; row < rows; ++row)
-    for (const std::size_t clique : cliques_of[row])
-      for (const PetscInt dof : cliques[clique])
-        if (last_row[dof] != row)
-        {
-          last_row[dof] = row;
-          ++(owns(dof) ? counts.own : counts.other)[row];
-        }
-  return counts;
+  return numbered.partition.element_rank[element] == rank_of(comm);
 }
 
-/// Counts the entries that elements and lumped contributions give this rank's rows.
-RowCounts count_entries(const Mesh& mesh, const DofMap& dofs, const std::vector<Contribution>& lumped)
+/// A matrix of zeros with the pattern of all contributions, as PETSc counts it.
+Owned<Mat> zero_matrix(const NumberedMesh& numbered, const std::vector<Contribution>& lumped, MPI_Comm comm)
 {
-  std::vector<std::vector<PetscInt>> cliques; // those with a row of this rank
-  const auto add = [&](std::vector<PetscInt> free)
+  const DofMap& dofs = numbered.dofs;
+  const PetscInt rows = dofs.last - dofs.first;
+  Owned<Mat> pattern, A;
+  for (const auto& [matrix, type] : {std::pair{&pattern, MATPREALLOCATOR}, std::pair{&A, MATAIJ}})
   {
-    const auto own = std::lower_bound(free.begin(), free.end(), dofs.first);
-    if (own != free.end() && *own < dofs.last) cliques.push_back(std::move(free));
+    check(MatCreate(comm, matrix->put()));
+    check(MatSetSizes(*matrix, rows, rows, dofs.size, dofs.size));
+    check(MatSetType(*matrix, type));
+  }
+  check(MatSetUp(pattern));
+  const auto add = [&](const std::vector<PetscInt>& nodal_dofs)
+  {
+    const std::vector<PetscInt> free = free_dofs(dofs, nodal_dofs);
+    const auto count = static_cast<PetscInt>(free.size());
+    check(MatSetValues(pattern, count, free.data(), count, free.data(), nullptr, INSERT_VALUES));
   };
-  for (const Element& element : mesh.elements) add(free_dofs(dofs, nodal_dofs_of(element)));
-  for (const Contribution& contribution : lumped) add(free_dofs(dofs, contribution.nodal_dofs));
-  return count_entries(dofs, cliques);
-}
-
-Owned<Mat> empty_matrix(const DofMap& dofs, const RowCounts& counts, MPI_Comm comm)
-{
-  Owned<Mat> A;
-  const PetscInt rows = dofs.last - dofs.first;
-  check(MatCreate(comm, A.put()));
-  check(MatSetSizes(A, rows, rows, dofs.size, dofs.size));
-  check(MatSetType(A, MATAIJ));
-  check(MatXAIJSetPreallocation(A, 1, counts.own.data(), counts.other.data(), nullptr, nullptr));
+  for (std::size_t i = 0; i < numbered.mesh.elements.size(); ++i)
+    if (is_own(numbered, i, comm)) add(nodal_dofs_of(numbered.mesh.elements[i]));
+  for (const Contribution& contribution : lumped)
+    if (rank_of(comm) == 0) add(contribution.nodal_dofs);
+  finish(pattern);
+  check(MatPreallocatorPreallocate(pattern, PETSC_TRUE, A));
   return A;
 }
 
@@ -91,17 +67,14 @@ Structure assemble(const NumberedMesh& numbered, const Scene& scene, MPI_Comm co
   structure.names = dofs.names;
   std::vector<Contribution> lumped;
   on_every_rank(comm, [&] { lumped = lumped_contributions(mesh, scene); });
-  {
-    const auto counts = count_entries(mesh, dofs, lumped);
-    for (Owned<Mat>* A : {&structure.M, &structure.C, &structure.K}) *A = empty_matrix(dofs, counts, comm);
-    structure.loss_omega = loss_omega(scene);
-    if (structure.loss_omega > 0) structure.K_loss = empty_matrix(dofs, counts, comm);
-  }
+  structure.M = zero_matrix(numbered, lumped, comm);
+  structure.loss_omega = loss_omega(scene);
+  for (Owned<Mat>* A : {&structure.C, &structure.K}) *A = copy_of(structure.M);
+  if (structure.loss_omega > 0) structure.K_loss = copy_of(structure.M);
   const auto add_own_elements = [&]
   {
     for (std::size_t i = 0; i < mesh.elements.size(); ++i)
-      if (numbered.partition.element_rank[i] == rank_of(comm))
-        add_contribution(structure, dofs, element_contribution(numbered, scene, i));
+      if (is_own(numbered, i, comm)) add_contribution(structure, dofs, element_contribution(numbered, scene, i));
   };
   on_every_rank(comm, add_own_elements);
   for (const Contribution& contribution : lumped)
@@ -109,8 +82,7 @@ Structure assemble(const NumberedMesh& numbered, const Scene& scene, MPI_Comm co
   for (Mat A : {structure.M.get(), structure.C.get(), structure.K.get(), structure.K_loss.get()})
   {
     if (!A) continue;
-    check(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
-    check(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+    finish(A);
     mark_symmetric(A);
   }
   add_spin(structure, numbered, scene);

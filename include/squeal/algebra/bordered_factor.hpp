@@ -5,8 +5,8 @@
 /// B is never eliminated. A solve has two halves: `forward` turns b into B A^-1 b, and `backward` gives x = A^-1 (b -
 /// B' lambda) for the caller's lambda. Both together cost less than two solves with A alone. Several right-hand sides
 /// are solved at once.
-#include "squeal/base/options.hpp"
 #include "squeal/base/petsc.hpp"
+#include "squeal/base/words.hpp"
 
 #include <array>
 #include <functional>

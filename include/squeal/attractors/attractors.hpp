@@ -4,7 +4,7 @@
 ///
 /// Caveat: motions are distinguished by mean energy and frequency alone, and one that few starts lead to may be missed.
 #include "squeal/attractors/reached.hpp"
-#include "squeal/base/options.hpp"
+#include "squeal/base/words.hpp"
 #include "squeal/transient/transient.hpp"
 
 namespace squeal

@@ -15,7 +15,8 @@
 /// Problems with the same W are solved together: each row of W that is read serves all of them.
 ///
 /// Caveat: neither is sure to converge where mu couples sliding and pressure strongly; the result says so.
-#include "squeal/base/options.hpp"
+#include "squeal/base/petsc.hpp"
+#include "squeal/base/words.hpp"
 #include "squeal/contact/contact_operator.hpp"
 
 namespace squeal

@@ -1,6 +1,6 @@
 #pragma once
-/// The mesh, its contact pairs and its partition. Rank 0 holds the whole mesh and prepares all that needs it; another
-/// rank receives a piece (squeal/solid/dofs.hpp). This room includes no PETSc.
+/// The mesh and look-ups in it. Rank 0 reads the file; then every rank holds the whole mesh. This room includes no
+/// PETSc.
 #include "squeal/mesh/file_mesh.hpp"
 #include "squeal/scene/scene.hpp"
 

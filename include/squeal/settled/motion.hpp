@@ -1,7 +1,7 @@
 #pragma once
 /// What a motion settles on where no cycle attracts: its statistics and its kind, on any flow with a tangent
 /// (src/README.md, section 7.10).
-#include "squeal/base/options.hpp"
+#include "squeal/base/petsc.hpp"
 #include "squeal/base/words.hpp"
 #include "squeal/settled/exponents.hpp"
 #include "squeal/settled/spectrum.hpp"

@@ -1,6 +1,7 @@
 #pragma once
 /// Options of the shooting solver, prefix -cycle_.
-#include "squeal/base/options.hpp"
+#include "squeal/base/petsc.hpp"
+#include "squeal/base/words.hpp"
 
 #include <array>
 

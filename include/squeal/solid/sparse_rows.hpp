@@ -18,9 +18,6 @@ Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_col
 /// collective.
 std::pair<PetscInt, PetscInt> local_range(PetscInt count, MPI_Comm comm);
 
-/// The range [first, last) of any rank.
-std::pair<PetscInt, PetscInt> range_of(PetscInt count, PetscInt rank, PetscInt ranks);
-
 /// The node that each probe reads, by its place in the whole mesh: of its point, body or group, the nearest to its
 /// position. Not collective.
 /// Throws Error for one that is not there or is not the only one.
