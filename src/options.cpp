@@ -82,10 +82,6 @@ SceneKeys options_of(ProgramOptions& options)
        Rule::not_negative},
       {"-settled_exponents", &options.settled.exponents, "-", "number of Lyapunov exponents of a settled motion",
        Rule::positive},
-      {"-sweep_groups", &options.sweep.groups, "-",
-       "groups of ranks that share the points, at most one a rank or a point; 0: chosen so that each has four points, "
-       "and memory for a model of its own",
-       Rule::not_negative},
       {"-response_tolerance", &options.response.tolerance, "-",
        "geometric mean of the residual forces of the responses and of the transposed problem, over a unit force",
        Rule::positive},

@@ -74,11 +74,8 @@ SlidingStability stability_beside_branch(NearbyModels& models, const Scene& scen
   settings.key = {branch.key};
   settings.values.assign(values.begin(), values.end());
   settings.directions = SweepDirections::one;
-  const auto model_at = [&](std::span<const double> value, MPI_Comm)
-  { return models.at(numbers_of(settings.key, value)); };
-  const SweepOptions together{.groups = 1};
-  const Sweep sweep =
-      run_sweep({settings, model_at, scene.modes, options.modes, options.equilibrium, together}, models.comm());
+  const auto model_at = [&](std::span<const double> value) { return models.at(numbers_of(settings.key, value)); };
+  const Sweep sweep = run_sweep({settings, model_at, scene.modes, options.modes, options.equilibrium}, models.comm());
   if (sweep.outcome.kind == OutcomeKind::interrupted) throw Interrupted{};
   SlidingStability stability;
   for (const SweepPoint& point : sweep.points)
@@ -145,29 +142,19 @@ Sweep run_scene_sweep(const Model& model, const Scene& scene, const ProgramOptio
                                                 "direction of rotation is not known, as another code's friction is "
                                                 "in the symmetric part of K as well: sweep one direction, and the "
                                                 "other one with matrices of its own");
-  std::optional<NearbyModels> models; // of the group of ranks that this one is in
-  const auto model_at = [&](std::span<const double> values, MPI_Comm comm)
-  {
-    if (!models || models->comm() != comm) models.emplace(model, scene, comm);
-    return models->at(numbers_of(scene.sweep->key, values));
-  };
-  return run_sweep({*scene.sweep, model_at, scene.modes, options.modes, options.equilibrium, options.sweep},
-                   comm_of(model.structure.load));
+  NearbyModels models(model, scene, comm_of(model.structure.load));
+  const auto model_at = [&](std::span<const double> values) { return models.at(numbers_of(scene.sweep->key, values)); };
+  return run_sweep({*scene.sweep, model_at, scene.modes, options.modes, options.equilibrium}, models.comm());
 }
 
 Robustness run_robustness(const Model& model, const Scene& scene, const ProgramOptions& options)
 {
   std::vector<std::string> keys;
   for (const UncertainNumber& number : scene.uncertain) keys.push_back(number.key);
-  std::optional<NearbyModels> models; // as of a sweep
-  const auto model_at = [&](std::span<const double> values, MPI_Comm comm)
-  {
-    if (!models || models->comm() != comm) models.emplace(model, scene, comm);
-    return models->at(numbers_of(keys, values));
-  };
+  NearbyModels models(model, scene, comm_of(model.structure.load));
+  const auto model_at = [&](std::span<const double> values) { return models.at(numbers_of(keys, values)); };
   return find_robustness(
-      {*scene.robustness, scene.uncertain, model_at, scene.modes, options.modes, options.equilibrium, options.sweep},
-      comm_of(model.structure.load));
+      {*scene.robustness, scene.uncertain, model_at, scene.modes, options.modes, options.equilibrium}, models.comm());
 }
 
 } // namespace squeal

@@ -7,7 +7,6 @@
 #include "squeal/scene/described.hpp"
 #include "squeal/settled/motion.hpp"
 #include "squeal/study/response.hpp"
-#include "squeal/study/sweep.hpp"
 #include "squeal/transient/transient.hpp"
 
 namespace squeal
@@ -22,7 +21,6 @@ struct ProgramOptions
   StepOptions step; // of the transient and of the cycle
   CycleOptions cycle;
   SettledOptions settled;
-  SweepOptions sweep;
   bool force = false;               // --force: run whatever the forecast says
   TableLength length{};             // --verbose: full
   std::string program{}, command{}; // by which the program was called

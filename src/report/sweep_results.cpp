@@ -200,7 +200,6 @@ void add_sweep(Entry out, const Report& report)
   out.show("residual", "-", "largest backward error of right and left vectors", sweep.outcome.residual);
   out.add("basis_shapes", "-", "shapes of the basis in the end", sweep.basis);
   out.add("basis_corrections", "-", "corrections of the basis by residuals", sweep.passes);
-  out.add("groups", "-", "groups of ranks that shared the points", sweep.groups);
   out.curve("points", add_point, sweep.points);
   out.list("unstable_tracks", add_track, unstable_tracks(sweep));
   out.list("thresholds", add_threshold, sweep.thresholds);

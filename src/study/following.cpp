@@ -129,8 +129,7 @@ void match_within(const Cluster& cluster, const MatrixXd& macs, double mac, std:
           best_j = j;
         }
     matches[static_cast<std::size_t>(from[static_cast<std::size_t>(best_i)])] = {
-        static_cast<int>(to[static_cast<std::size_t>(best_j)]), mac, static_cast<int>(cluster.from.size()),
-        static_cast<int>(cluster.from.front())};
+        static_cast<int>(to[static_cast<std::size_t>(best_j)]), mac, static_cast<int>(cluster.from.size())};
     from.erase(from.begin() + best_i);
     to.erase(to.begin() + best_j);
   }
@@ -154,7 +153,7 @@ void match_single(const MatrixXd& macs, double clear, std::vector<Match>& matche
     if (macs.row(i).maxCoeff(&j) < clear) continue;
     macs.col(j).maxCoeff(&back);
     if (back != i) continue;
-    matches[static_cast<std::size_t>(i)] = {static_cast<int>(j), macs(i, j), 1, static_cast<int>(i)};
+    matches[static_cast<std::size_t>(i)] = {static_cast<int>(j), macs(i, j), 1};
     taken[static_cast<std::size_t>(j)] = 1;
   }
 }

@@ -11,7 +11,6 @@ struct Match
   int to = -1;      // place among the modes of the next point; -1: unclear
   double mac = 0;   // of the mode, or of the subspace
   int subspace = 1; // number of modes that are matched together
-  int cluster = -1; // the first of them
 };
 
 /// A point with its modes on the basis, and the track of each.

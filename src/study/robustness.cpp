@@ -130,9 +130,9 @@ Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
   SweepSettings points;
   for (const UncertainNumber& number : problem.numbers) points.key.push_back(number.key);
   points.design = random_values(problem, comm);
-  Sweep sweep = run_sweep({points, problem.model_at, problem.modes, problem.modes_options, problem.equilibrium_options,
-                           problem.options, "robustness"},
-                          comm);
+  Sweep sweep = run_sweep(
+      {points, problem.model_at, problem.modes, problem.modes_options, problem.equilibrium_options, "robustness"},
+      comm);
   if (sweep.outcome.kind == OutcomeKind::interrupted) throw Interrupted{};
   Robustness result;
   result.outcome = sweep.outcome;

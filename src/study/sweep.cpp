@@ -2,7 +2,6 @@
 
 #include "following.hpp"
 #include "squeal/base/run_control.hpp"
-#include "sweep_groups.hpp"
 #include "sweeper.hpp"
 
 #include <algorithm>
@@ -13,6 +12,21 @@ namespace squeal
 
 namespace
 {
+
+std::vector<SweepLine> lines_of(const SweepSettings& settings)
+{
+  SweepLine line{settings.design, false, settings.design.empty()};
+  std::vector<double> values = settings.values;
+  std::ranges::sort(values);
+  if (line.ordered && values.empty())
+    for (int i = 0; i < settings.points; ++i)
+      values.push_back(settings.from + i * (settings.to - settings.from) / (settings.points - 1));
+  for (const double value : values) line.points.push_back({value});
+  std::vector<SweepLine> lines{line};
+  line.reversed = true;
+  if (settings.directions == SweepDirections::both) lines.push_back(line);
+  return lines;
+}
 
 using TrackNames = std::map<int, int>; // of a line, to those of the whole
 
@@ -29,22 +43,12 @@ TrackNames names_by(const SweepPoint& here, const SweepPoint& there)
   return names;
 }
 
-/// Adds what was found along a line. Its tracks get the names that its first modes have elsewhere: at the same point of
-/// another group, or at the start in the other direction of rotation, where friction is weak; else new ones.
-void add(Sweep& whole, const Sweep& part, const SweepLine& line)
+/// Adds what was found along a line. Its tracks get the names that its first modes have at the start in the other
+/// direction of rotation, where friction is weak; else new ones.
+void add(Sweep& whole, const Sweep& part)
 {
-  auto first = part.points.begin();
   TrackNames names;
-  if (first != part.points.end() && !whole.points.empty())
-  {
-    const auto is_shared = [&](const SweepPoint& point)
-    { return point.values == first->values && point.reversed == first->reversed; };
-    const auto shared = std::ranges::find_if(whole.points, is_shared);
-    if (!line.continued)
-      names = names_by(*first, whole.points.front());
-    else if (shared != whole.points.end()) // it lacks where a group was asked to end
-      names = names_by(*first++, *shared);
-  }
+  if (!part.points.empty() && !whole.points.empty()) names = names_by(part.points.front(), whole.points.front());
   const auto rename = [&](int& track)
   {
     if (track < 0) return;
@@ -52,7 +56,7 @@ void add(Sweep& whole, const Sweep& part, const SweepLine& line)
     whole.tracks += is_new;
     track = name->second;
   };
-  for (SweepPoint point : std::vector(first, part.points.end()))
+  for (SweepPoint point : part.points)
   {
     for (SweptMode& mode : point.modes) rename(mode.track);
     whole.points.push_back(std::move(point));
@@ -110,21 +114,14 @@ void assess(Sweep& sweep, const std::vector<std::string>& keys, std::size_t tota
 Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm)
 {
   const std::vector<SweepLine> lines = lines_of(problem.settings);
-  const std::size_t total = points_of(lines);
-  const int groups = groups_of(problem.options.groups, total, comm);
-  VisitedLines visited;
-  if (groups > 1)
-    visited = visit_in_groups(problem, lines, groups, comm);
-  else
-    visited = {lines, visit(problem, comm, lines)};
+  std::size_t total = 0;
+  for (const SweepLine& line : lines) total += line.points.size();
   Sweep sweep;
-  sweep.groups = groups;
   sweep.outcome.kind = OutcomeKind::converged;
-  for (std::size_t i = 0; i < visited.found.size(); ++i)
+  for (const Sweep& found : visit(problem, comm, lines))
   {
-    add(sweep, visited.found[i], visited.lines[i]);
-    if (visited.ended || visited.found[i].outcome.kind == OutcomeKind::interrupted)
-      sweep.outcome.kind = OutcomeKind::interrupted;
+    add(sweep, found);
+    if (found.outcome.kind == OutcomeKind::interrupted) sweep.outcome.kind = OutcomeKind::interrupted;
   }
   assess(sweep, problem.settings.key, total);
   return sweep;

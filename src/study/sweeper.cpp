@@ -33,7 +33,7 @@ class Sweeper
 {
 public:
   Sweeper(const SweepProblem& problem, MPI_Comm comm)
-      : problem_(problem), comm_(comm), model_(problem, comm, [comm] { end_if_asked(comm); })
+      : problem_(problem), comm_(comm), model_(problem, [comm] { end_if_asked(comm); })
   {
   }
 
@@ -51,7 +51,7 @@ public:
         found.push_back(std::exchange(sweep_, {}));
       }
     }
-    catch (const Interrupted&) // on all ranks of this share alike
+    catch (const Interrupted&) // on all ranks alike
     {
       sweep_.outcome.kind = OutcomeKind::interrupted;
       found.push_back(std::move(sweep_));
@@ -66,7 +66,9 @@ private:
   /// Finds the pairs that are closed at every point, of design points at the first ones, and the basis.
   void prepare(const std::vector<SweepLine>& lines)
   {
-    progress_.emplace(comm_, problem_.name, static_cast<double>(points_of(lines)));
+    std::size_t points = 0;
+    for (const SweepLine& line : lines) points += line.points.size();
+    progress_.emplace(comm_, problem_.name, static_cast<double>(points));
     for (const SweepLine& line : lines)
       for (const std::vector<double>& values :
            std::span(line.points).first(line.ordered ? line.points.size() : std::min(line.points.size(), prepared)))

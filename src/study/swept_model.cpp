@@ -1,12 +1,12 @@
 #include "swept_model.hpp"
 
-#include "squeal/algebra/root.hpp"
 #include "squeal/contact/pairs.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
-#include <limits>
 #include <numeric>
+#include <utility>
 
 namespace squeal
 {
@@ -19,8 +19,8 @@ void reverse_rotation(Structure& structure, Interface& interface)
   check(MatScale(structure.G, -1));
 }
 
-SweptModel::SweptModel(const SweepProblem& problem, MPI_Comm comm, std::function<void()> end_if_asked)
-    : problem_(problem), comm_(comm), end_if_asked_(std::move(end_if_asked)), searched_(problem_.equilibrium_options)
+SweptModel::SweptModel(const SweepProblem& problem, std::function<void()> end_if_asked)
+    : problem_(problem), end_if_asked_(std::move(end_if_asked)), searched_(problem_.equilibrium_options)
 {
 }
 
@@ -28,7 +28,7 @@ void SweptModel::go_to(const SweptPlace& place)
 {
   if (model_ && at_ == place) return;
   model_.reset();
-  model_ = problem_.model_at(place.values, comm_);
+  model_ = problem_.model_at(place.values);
   if (place.reversed) reverse_rotation(model_->structure, model_->interface);
   at_ = place;
 }
@@ -136,32 +136,21 @@ std::optional<ContactChange> SweptModel::contact_change(const SweptPlace& from, 
   if (last.closed.size() != pairs || changing.in1 == first.closed.end()) return std::nullopt;
   const auto pair = static_cast<std::size_t>(changing.in1 - first.closed.begin());
 
-  // The pair's reaction, or less its gap, over the value at its own end: continuous, and zero at the change alone
-  const auto reaction = [&](const Equilibrium& at) { return PairView(at.reactions, at.directions).normal(pair); };
-  const bool opens = first.closed[pair];
-  const auto scale = [](double at_end) { return at_end > 0 ? at_end : 1; };
-  const double of_reaction = scale(reaction(opens ? first : last)), of_gap = scale((opens ? last : first).gaps[pair]);
-  constexpr double least = std::numeric_limits<double>::min(); // a zero would be of neither side
   searched_.expect(first.closed); // what is expected next: not what was visited before, which a restart does not
-  std::optional<double> failed;
-  std::vector<SweptPlace> visited;
-  const auto contact = [&](double value) -> std::optional<double>
+  double before = from.values[0], behind = to.values[0];
+  while (std::abs(behind - before) > tolerance)
   {
     end_if_asked_();
     SweptPlace place = to;
-    place.values[0] = value;
-    visited.push_back(place);
+    place.values[0] = (before + behind) / 2;
     const Equilibrium& at = equilibrium_at(place);
-    if (at.outcome.kind != OutcomeKind::converged || at.closed.size() != pairs) failed = value;
-    if (failed) return std::nullopt;
-    return at.closed[pair] ? std::max(reaction(at) / of_reaction, least) : -std::max(at.gaps[pair] / of_gap, least);
-  };
-  const Bracket ends{from.values[0], to.values[0], opens ? 1. : -1., opens ? -1. : 1.};
-  const Bracket found = find_root(contact, ends, tolerance).bracket;
-  for (const SweptPlace& place : visited)
-    if (place.values[0] != found.a && place.values[0] != found.b) forget(place);
-  if (failed) return ContactChange{0, 0, failed};
-  return ContactChange{found.a, found.b};
+    if (at.outcome.kind != OutcomeKind::converged || at.closed.size() != pairs)
+      return ContactChange{0, 0, place.values[0]};
+    double& end = at.closed[pair] == first.closed[pair] ? before : behind;
+    place.values[0] = std::exchange(end, place.values[0]);
+    if (place != from && place != to) forget(place);
+  }
+  return ContactChange{before, behind};
 }
 
 ModeForms SweptModel::forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to,

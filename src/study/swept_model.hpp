@@ -22,7 +22,7 @@ class SweptModel
 public:
   /// Calls `end_if_asked` between parts of long work: equilibria of a search, corrections of the basis.
   /// Borrows the problem.
-  SweptModel(const SweepProblem& problem, MPI_Comm comm, std::function<void()> end_if_asked);
+  SweptModel(const SweepProblem& problem, std::function<void()> end_if_asked);
 
   /// Finds the equilibrium of a point. The pairs that are closed at all points prepared are those of the basis.
   void prepare(const SweptPlace& place);
@@ -73,7 +73,6 @@ private:
   const Known& known_at(const SweptPlace& place);
 
   const SweepProblem& problem_;
-  MPI_Comm comm_;
   std::function<void()> end_if_asked_;
   Equilibria searched_;
   std::optional<BrakeModel> model_{}; // at the point visited last

@@ -205,12 +205,11 @@ def test_design_points_have_the_modes_of_the_first(converged, tmp_path):
     assert len(names_at) == 4 and len(unstable) == 1  # the partner that grows
 
 
-@pytest.mark.parametrize("ranks, groups", [(2, 0), (3, 2)])
-def test_ranks_and_their_groups_agree(ranks, groups, pin, squeal):
-    """However the points are shared: the same modes, under the same names, and the same thresholds."""
-    other = squeal(*PIN, *sweep_of(end=0.35, points=4, directions="both"), "-sweep_groups", str(groups), ranks=ranks)
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_ranks_agree(ranks, pin, squeal):
+    """The same modes, under the same names, and the same thresholds."""
+    other = squeal(*PIN, *sweep_of(end=0.35, points=4, directions="both"), ranks=ranks)
     assert other.code == 0
-    assert other.report["sweep"]["groups"] == (groups or 2)  # of eight points each gets four at least
     first, second = rows_of(pin.output), rows_of(other.output)
     for direction in (1, -1):
         for mu in (0.05, 0.15, 0.25, 0.35):
@@ -228,28 +227,6 @@ def names(rows):
         value = row.get("friction.coefficient") or row["point.pad.mass"]
         points.setdefault((value, row["direction"]), []).append(row["track"])
     return points
-
-
-@pytest.mark.parametrize("sweep", [
-    sweep_of(start=0.1, end=0.3, points=5, directions="both"),
-    sweep_of("point.pad.mass", 0.4, 3.0, points=4, directions="both"),
-    ["--set", "sweep.directions=both", "--set", "sweep.table={table}"],
-    ["--set", "sweep.key=friction.coefficient", "--set", "sweep.values=[0.1,0.2,0.3]"],
-])
-def test_groups_share_few_points_and_design_points(sweep, squeal, tmp_path):
-    table = write_table(tmp_path, *((0.1 + 0.03 * i, 0.02 + 0.01 * (i % 3)) for i in range(7)))
-    sweep = [word.format(table=table) for word in sweep]
-    one, two = squeal(*OSCILLATOR, *sweep, ranks=1), squeal(*OSCILLATOR, *sweep, "-sweep_groups", "9", ranks=2)
-    assert one.code == two.code == 0
-    assert two.report["sweep"]["groups"] == 2
-    points = one.report["sweep"]["points"]
-    assert one.report["sweep"]["unstable_points"] == sum(point["unstable_modes"] > 0 for point in points)
-    for a, b in zip(one.report["sweep"]["points"], two.report["sweep"]["points"], strict=True):
-        assert a["values"] == b["values"] and a["direction"] == b["direction"]
-        assert a["growth_rate"] == pytest.approx(b["growth_rate"], abs=1e-9)  # of an eigenvalue of some 10 1/s
-    assert names(rows_of(one.output)) == names(rows_of(two.output)) or "sweep.key=point.pad.mass" in sweep
-    for a, b in zip(one.report["sweep"]["thresholds"], two.report["sweep"]["thresholds"], strict=True):
-        assert a["values"] == pytest.approx(b["values"], abs=a["error"] + b["error"]) and a["track"] == b["track"]
 
 
 def test_points_that_fail_are_passed_over(squeal):
@@ -313,7 +290,7 @@ def test_the_pictures_are_drawn(pin, converged, tmp_path):
 
 @pytest.mark.parametrize("ranks, divisions, start, end, points", [(1, 2, 0.4, 0.5, 3), (2, 1, 0.05, 0.35, 24)])
 def test_an_interrupted_sweep_keeps_its_points_and_begins_again(ranks, divisions, start, end, points, squeal, tmp_path):
-    """What is done is written; the restart finds the same points and thresholds as in one piece; two ranks are two groups. Between
+    """What is done is written; the restart finds the same points and thresholds as in one piece. Between
     0.4 and 0.5 a pair of nine opens: points are put in, and one mode ends there and another begins."""
     pin = PIN[:PIN.index("modes.method=full") - 1]  # modes leave the scene's own band and come back
     pin += ["--set", f"mesh.parameters.divisions={divisions}"]
@@ -332,7 +309,6 @@ def test_an_interrupted_sweep_keeps_its_points_and_begins_again(ranks, divisions
         code = squeal(*ask, "--restart", ranks=ranks).code
     assert whole.code == code == 0
     one, two = whole.report["sweep"], json.loads((tmp_path / "in_two" / "report.json").read_text())["sweep"]
-    assert one["groups"] == two["groups"] == ranks
     assert [p["values"] for p in one["points"]] == [p["values"] for p in two["points"]]
     tracks = [[(row["friction.coefficient"], row["track"]) for row in rows_of(folder)]
               for folder in (whole.output, tmp_path / "in_two")]

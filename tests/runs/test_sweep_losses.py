@@ -104,10 +104,9 @@ def test_a_single_run_changes_at_the_loss_factor_that_stabilises(converged):
     assert counts[1] - counts[0] == threshold["change"] == -1
 
 
-def test_groups_of_ranks_agree(converged):
+def test_ranks_agree(converged):
     ask = [*ALL, *sweep_of(end=0.35, points=4)]
-    one, two = (converged(*ask, "-sweep_groups", str(ranks), ranks=ranks) for ranks in (1, 2))
-    assert two.report["sweep"]["groups"] == 2
+    one, two = (converged(*ask, ranks=ranks) for ranks in (1, 2))
     for value in (0.05, 0.15, 0.25, 0.35):
         same_modes(*(modes_at(rows_of(run.output), value) for run in (one, two)), 1e-9)
 

@@ -48,14 +48,13 @@ struct RobustnessProblem
 {
   const RobustnessSettings& settings;
   const std::vector<UncertainNumber>& numbers;
-  std::function<BrakeModel(std::span<const double> values, MPI_Comm comm)> model_at;
+  std::function<BrakeModel(std::span<const double> values)> model_at;
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;
-  const SweepOptions& options;
 };
 
-/// Groups of ranks compute samples of their own. Collective.
+/// Collective.
 Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm);
 
 } // namespace squeal

@@ -67,31 +67,23 @@ struct Sweep
   int cut_short = 0;           // steps between points of the scene that needed more points in between than allowed
   double least_mac = 1;        // along all tracks, where the same pairs are closed or modes change little
   double least_mac_across = 1; // of modes that jump where pairs open or close
-  int basis = 0;               // shapes of the basis in the end; of several groups the largest
-  int passes = 0;              // corrections of the bases by residuals
-  int groups = 1;              // of ranks, which shared the points
-};
-
-/// How a sweep is shared.
-struct SweepOptions
-{
-  PetscInt groups = 0; // of ranks, at most one a rank or a point; 0: chosen
+  int basis = 0;               // shapes of the basis in the end
+  int passes = 0;              // corrections of the basis by residuals
 };
 
 /// The points to visit and how each is computed.
 struct SweepProblem
 {
   const SweepSettings& settings;
-  std::function<BrakeModel(std::span<const double> values, MPI_Comm comm)> model_at;
+  std::function<BrakeModel(std::span<const double> values)> model_at;
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;
-  const SweepOptions& options;
   const char* name = "sweep"; // in progress
 };
 
 /// Visits all points, follows the modes along each line and finds the thresholds on the way. A point that fails is
-/// recorded with its reason. Groups of ranks visit a part of the points each. Collective.
+/// recorded with its reason. Collective.
 Sweep run_sweep(const SweepProblem& problem, MPI_Comm comm);
 
 } // namespace squeal
