@@ -16,7 +16,7 @@ Response run_response(const SlidingPoint& point, const Scene& scene, const Progr
   for (std::size_t i = 0; i < scene.probes.size(); ++i)
     if (scene.response->excitation.empty() || std::ranges::count(scene.response->excitation, scene.probes[i].name) > 0)
       excitations.push_back(static_cast<int>(i));
-  return find_response({point.sliding(), *point.linearised, point.modes.modes, point.model->probes, excitations,
+  return find_response({point.sliding(), *point.linearised, point.model->probes, excitations,
                         frequencies_of(*scene.response), options.response, options.modes.pencil});
 }
 

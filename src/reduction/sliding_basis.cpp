@@ -143,37 +143,15 @@ MatrixXd lifted(const BasisImage& image, const Lifts& lifts)
   return image.products + image.sign * inner_products(rows, by_Z.change) + inner_products(by_Y.change, lifted_rows);
 }
 
-/// On the rows of B, symmetric or not.
-struct PairMatrix
+/// T_Y'B'D B T_Z
+MatrixXd projected_on_pairs(const SlidingBasis& basis, const LinearisedPoint& point, const Lifts& lifts, Mat D)
 {
-  Mat matrix = nullptr;
-  bool symmetric = false;
-};
-
-/// T_Y'B'D B T_Z. Most rows of D are zero: of friction's damping those of normals and, mostly, along the drive. The
-/// others may hold no pivot: then B T_Y and B T_Z are B T there.
-MatrixXd projected_on_pairs(const SlidingBasis& basis, const Lifts& lifts, const PairMatrix& D)
-{
-  std::vector<PetscInt> rows;
-  for_each_row(D.matrix,
-               [&](PetscInt row, std::span<const PetscInt>, std::span<const PetscScalar> values)
-               {
-                 if (std::ranges::any_of(values, [](PetscScalar value) { return value != 0; })) rows.push_back(row);
-               });
-  const Owned<IS> taken = set_of(comm_of(basis.B), rows);
-  const Owned<Mat> D_taken = part_of(D.matrix, taken, taken), at_pivots = part_of(basis.B, taken, lifts.pivots);
-  const MultiVector sliding = product(part_of(basis.B, taken, own_range(basis.B, MatGetOwnershipRangeColumn)), basis.T);
-  double entries = 0;
-  check(MatNorm(at_pivots, NORM_FROBENIUS, &entries));
-  if (entries == 0)
-  {
-    const MultiVector force = product(D_taken, sliding);
-    return D.symmetric ? symmetric_inner_products(sliding, force) : inner_products(sliding, force);
-  }
+  const Owned<Mat> B_pivots = at_pivots(basis.B, point.contact);
+  const MultiVector motion = product(basis.B, basis.T);
   const auto lifted = [&](const MultiVector& change) {
-    return MultiVector{change.comm, sliding.entries + product(at_pivots, change).entries};
+    return MultiVector{change.comm, motion.entries + product(B_pivots, change).entries};
   };
-  return inner_products(lifted(lifts.by_Y.change), product(D_taken, lifted(lifts.by_Z.change)));
+  return inner_products(lifted(lifts.by_Y.change), product(D, lifted(lifts.by_Z.change)));
 }
 
 } // namespace
@@ -294,8 +272,8 @@ ProjectedSliding project(const SlidingBasis& basis, const LinearisedPoint& point
     result.C = lifted(basis.C, lifts);
   if (basis.G.matrix.get()) result.C += lifted(basis.G, lifts);
   if (basis.H.matrix.get()) result.K += lifted(basis.H, lifts);
-  if (point.damping.get()) result.C += projected_on_pairs(basis, lifts, {point.damping, true});
-  if (point.stiffness.get()) result.K += projected_on_pairs(basis, lifts, {point.stiffness, false});
+  if (point.damping.get()) result.C += projected_on_pairs(basis, point, lifts, point.damping);
+  if (point.stiffness.get()) result.K += projected_on_pairs(basis, point, lifts, point.stiffness);
   return result;
 }
 

@@ -32,40 +32,17 @@ MatrixXcd padded(const PointModes& point, Eigen::VectorXcd TwoSidedPair::*side, 
   return result;
 }
 
-/// (lambda_i + lambda_j) left_i'M right_j of those products.
-MatrixXcd form(const std::vector<TwoSidedPair>& lefts, const std::vector<TwoSidedPair>& rights, MatrixXcd products)
-{
-  for (Index i = 0; i < products.rows(); ++i)
-    for (Index j = 0; j < products.cols(); ++j)
-      products(i, j) *= lefts[static_cast<std::size_t>(i)].lambda + rights[static_cast<std::size_t>(j)].lambda;
-  return products;
-}
-
 /// left_i'((lambda_i + lambda_j) M + C) right_j: zero between different modes of one point.
 MatrixXcd form(const PointModes& lefts, const PointModes& rights, const PointModes& matrices)
 {
   const Index rows = matrices.M.rows();
   const MatrixXcd left = padded(lefts, &TwoSidedPair::left, rows), right = padded(rights, &TwoSidedPair::right, rows);
-  return form(lefts.pairs, rights.pairs, left.transpose() * real_times(matrices.M, right)) +
-         left.transpose() * real_times(matrices.C, right);
-}
-
-/// left'A right of vectors given by their real, then their imaginary parts.
-MatrixXcd bilinear(const MultiVector& left, const MultiVector& A_right)
-{
-  const MatrixXd parts = inner_products(left, A_right);
-  const Index rows = parts.rows() / 2, columns = parts.cols() / 2;
-  MatrixXcd result(rows, columns);
-  result.real() = parts.topLeftCorner(rows, columns) - parts.bottomRightCorner(rows, columns);
-  result.imag() = parts.topRightCorner(rows, columns) + parts.bottomLeftCorner(rows, columns);
-  return result;
-}
-
-/// The same form of vectors in the structure's degrees of freedom.
-MatrixXcd form(const ExpandedModes& lefts, const ExpandedModes& rights, const MultiVector& M_right,
-               const MultiVector& C_right)
-{
-  return form(lefts.pairs, rights.pairs, bilinear(lefts.left, M_right)) + bilinear(lefts.left, C_right);
+  MatrixXcd result = left.transpose() * real_times(matrices.M, right);
+  for (Index i = 0; i < result.rows(); ++i)
+    for (Index j = 0; j < result.cols(); ++j)
+      result(i, j) *=
+          lefts.pairs[static_cast<std::size_t>(i)].lambda + rights.pairs[static_cast<std::size_t>(j)].lambda;
+  return result + left.transpose() * real_times(matrices.C, right);
 }
 
 /// The MAC of two subspaces: the least modulus of the eigenvalues of first^-1 there second^-1 back, which are 1 for
@@ -200,19 +177,6 @@ ModeForms forms_between(const PointModes& from, const PointModes& to)
 {
   const PointModes& last = from.M.rows() > to.M.rows() ? from : to; // has all shapes
   return {form(from, to, last), form(to, from, last), form(from, from, last), form(to, to, last)};
-}
-
-ModeForms forms_between(const ExpandedModes& from, const ExpandedModes& to, Mat M, Mat C)
-{
-  ModeForms forms;
-  for (const ExpandedModes* rights : {&from, &to})
-  {
-    const MultiVector M_right = product(M, rights->right), C_right = product(C, rights->right);
-    const bool of_first = rights == &from;
-    (of_first ? forms.first : forms.there) = form(from, *rights, M_right, C_right);
-    (of_first ? forms.back : forms.second) = form(to, *rights, M_right, C_right);
-  }
-  return forms;
 }
 
 std::vector<Match> follow(const ModeForms& forms, double clear)

@@ -43,7 +43,7 @@ struct ModeForms
 /// The MAC of each mode of the first with each of the second point.
 Eigen::MatrixXd all_macs(const ModeForms& forms);
 
-/// On the basis that both points share; equal pairs are closed. Not collective.
+/// On the basis that both points share. Not collective.
 ModeForms forms_between(const PointModes& from, const PointModes& to);
 
 /// For each eigenvalue of one list its partner in another, the nearest, each at most once; -1: the other is shorter.
@@ -54,17 +54,6 @@ std::vector<int> nearest_partners(const std::vector<std::complex<double>>& from,
 /// For each mode of a point the place of the mode of a reference that it shares most with, and whose frequency is not
 /// far from its own; -1: it is like none. Not collective.
 std::vector<int> names_by_shapes(const PointModes& reference, const PointModes& point);
-
-/// Modes in the structure's degrees of freedom, as `expanded` gives them.
-struct ExpandedModes
-{
-  const std::vector<TwoSidedPair>& pairs;
-  MultiVector right, left;
-};
-
-/// In the structure's degrees of freedom, whatever pairs are closed. `C`: with G and C_f, without loss factors.
-/// Collective.
-ModeForms forms_between(const ExpandedModes& from, const ExpandedModes& to, Mat M, Mat C);
 
 /// For each mode of the first point its match at the second one, by the MAC of right with left vectors, which is at
 /// least `clear`. Not collective.

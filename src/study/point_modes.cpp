@@ -345,13 +345,6 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   move_to(modes.pencil, shift_below_zero(modes.M_z, modes.K_z));
 }
 
-MultiVector expanded(const ModesBasis& modes, const ClosedContact& contact, const std::vector<TwoSidedPair>& pairs,
-                     Side side)
-{
-  const MultiVector x = kept_rows(combination_of_shapes(modes.basis, parts_of(vectors_of(pairs, side))), contact);
-  return product(side == Side::right ? contact.Z : contact.Y, x);
-}
-
 PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
 {
   set_model(modes.basis, problem.sliding.structure, problem.sliding.interface);

@@ -64,11 +64,6 @@ struct PointModes
   Eigen::MatrixXd M{}, C{};        // of the point, on the basis
 };
 
-/// The vectors of one side in the structure's degrees of freedom: the real parts of all, then the imaginary ones.
-/// `contact`: of the point where they were found last.
-MultiVector expanded(const ModesBasis& modes, const ClosedContact& contact, const std::vector<TwoSidedPair>& pairs,
-                     Side side);
-
 /// The backward error of vectors that are exact.
 inline constexpr double exact_tolerance = 1e-10;
 

@@ -30,14 +30,6 @@ constexpr double variance = 1. / 3;   // of their entries, even in (-1, 1)
 constexpr double least_error = 1e-14; // backward error that no correction makes smaller
 constexpr std::size_t few = 16;       // frequencies whose residuals are estimated before those of all are
 constexpr double deep = 1e-4;         // part of the largest |H| at a frequency; below it errors are relative to this
-constexpr double negligible = 1e-3;   // part of a mode's shape that a basis does not start with
-
-/// Modes of the equilibrium on the kept degrees of freedom.
-struct KnownModes
-{
-  std::vector<Complex> lambda; // [1/s]
-  MultiVector shapes;          // of norm 1, real and imaginary part of each
-};
 
 /// The forces of a side: at the driven probes, Y'p, those of right vectors; at the read ones, Z'p, those of left ones.
 struct UnitForces
@@ -53,7 +45,6 @@ struct Equations
   QuadraticProblem sliding;
   QuadraticNorms norms{};
   std::array<UnitForces, 2> forces{}; // by sides
-  KnownModes modes{};
 
   const UnitForces& of(Side side) const { return forces[static_cast<std::size_t>(side)]; }
 };
@@ -75,21 +66,6 @@ std::vector<int> all_rows(Mat probes)
   return rows;
 }
 
-/// The known modes that oscillate.
-KnownModes known_modes(std::span<const ComplexMode> modes, const ClosedContact& contact)
-{
-  KnownModes known{{}, empty_multivector(contact.Z)};
-  for (const ComplexMode& mode : modes)
-  {
-    if (!(mode.lambda.imag() > 0)) continue;
-    MultiVector parts = kept_rows(columns_of(std::array{mode.real.get(), mode.imaginary.get()}), contact);
-    parts.entries /= column_norms(parts).norm();
-    append(known.shapes, parts);
-    known.lambda.push_back(mode.lambda);
-  }
-  return known;
-}
-
 Equations make_equations(const ResponseProblem& problem)
 {
   Equations equations{linearise_point(problem.sliding), sliding_problem(problem.sliding.structure, problem.linearised)};
@@ -97,7 +73,6 @@ Equations make_equations(const ResponseProblem& problem)
   equations.norms = norms_of(equations.sliding);
   equations.forces = {unit_forces(problem.probes, problem.excitations, contact.Y),
                       unit_forces(problem.probes, all_rows(problem.probes), contact.Z)};
-  equations.modes = known_modes(problem.modes, contact);
   return equations;
 }
 
@@ -125,15 +100,15 @@ Index extend(HarmonicBasis& basis, const MultiVector& X)
   return gained;
 }
 
-/// Solutions of both sides at a frequency, on the first shapes of a basis, and what they leave over on its random
-/// vectors.
+/// Solutions of both sides at a frequency on a basis, and what they leave over on its random vectors.
 struct HarmonicSolution
 {
   std::array<MatrixXcd, 2> a{}, left_over{}; // a column a force
 };
 
-HarmonicSolution solve_at(double omega, const HarmonicBasis& basis, Index size)
+HarmonicSolution solve_at(double omega, const HarmonicBasis& basis)
 {
+  const Index size = basis.size();
   const auto& [M, C, K, K_loss] = basis.projected;
   const MatrixXcd Q = sum({M, C, K, K_loss}, loss_factors({0, omega}));
   const auto& [driven, read] = basis.forces;
@@ -163,9 +138,9 @@ struct HarmonicScan
   }
 };
 
-/// Each rank solves frequencies of its own; all have the result. `size`: the number of shapes taken, the first ones.
-/// `tolerance`: residual allowed; rounding is allowed in any case. Collective.
-HarmonicScan scan(const HarmonicBasis& basis, const std::vector<double>& omega, Index size, double tolerance)
+/// Each rank solves frequencies of its own; all have the result. `tolerance`: residual allowed; rounding is allowed in
+/// any case. Collective.
+HarmonicScan scan(const HarmonicBasis& basis, const std::vector<double>& omega, double tolerance)
 {
   const auto count = static_cast<Index>(omega.size());
   const Equations& equations = basis.equations;
@@ -175,8 +150,8 @@ HarmonicScan scan(const HarmonicBasis& basis, const std::vector<double>& omega, 
   for (Index f = rank_of(comm); f < count; f += ranks_of(comm))
   {
     const double at = omega[static_cast<std::size_t>(f)];
-    const HarmonicSolution solution = solve_at(at, basis, size);
-    result.receptance.col(f) = (basis.forces[1].middleRows(sketches, size).transpose() * solution.a[0]).reshaped();
+    const HarmonicSolution solution = solve_at(at, basis);
+    result.receptance.col(f) = (basis.forces[1].bottomRows(basis.size()).transpose() * solution.a[0]).reshaped();
     const double scale = at * (at * equations.norms.M + equations.norms.C) + equations.norms.K;
     for (Index row = 0; row < b + c; ++row)
     {
@@ -196,16 +171,6 @@ HarmonicScan scan(const HarmonicBasis& basis, const std::vector<double>& omega, 
   return result;
 }
 
-/// Q(lambda_k) y_k of both parts of each vector: the real parts of all, then the imaginary ones. Collective.
-MultiVector dynamic_images(const HarmonicBasis& basis, Side side, const Eigen::VectorXcd& lambda,
-                           const std::function<MultiVector(const MatrixXcd& weights)>& y)
-{
-  const MatrixXcd one = MatrixXcd::Identity(lambda.size(), lambda.size());
-  MatrixXcd weights(one.rows(), 2 * one.cols());
-  weights << one, Complex(0, -1) * one;
-  return dynamic_forces(basis.on, basis.equations.point, side, {lambda, weights, y});
-}
-
 /// Evenly spread frequencies, at most `most`.
 std::vector<double> thinned(const std::vector<double>& omega, std::size_t most)
 {
@@ -213,40 +178,6 @@ std::vector<double> thinned(const std::vector<double>& omega, std::size_t most)
   std::vector<double> result;
   for (std::size_t i = 0; i < taken; ++i) result.push_back(omega[i * omega.size() / taken]);
   return result;
-}
-
-/// The known modes between these frequencies, or at most half their distance beyond.
-std::vector<Index> modes_near(const KnownModes& modes, double from, double to)
-{
-  std::vector<Index> near;
-  for (std::size_t i = 0; i < modes.lambda.size(); ++i)
-    if (std::abs(modes.lambda[i].imag() - (from + to) / 2) <= to - from) near.push_back(static_cast<Index>(i));
-  return near;
-}
-
-/// What modes add to a basis: their shapes phi, and for the transposed problem -P'^-1 Q(lambda)'phi, by which its modes
-/// differ from them to first order in friction.
-MultiVector shapes_of(const HarmonicBasis& basis, const std::vector<Index>& which, const PencilFactor& P)
-{
-  const KnownModes& modes = basis.equations.modes;
-  MultiVector re = empty_multivector(basis.equations.sliding.K), im = re;
-  Eigen::VectorXcd lambda(static_cast<Index>(which.size()));
-  for (Index k = 0; k < lambda.size(); ++k)
-  {
-    const Index i = which[static_cast<std::size_t>(k)];
-    lambda(k) = modes.lambda[static_cast<std::size_t>(i)];
-    append(re, {re.comm, modes.shapes.entries.col(2 * i)});
-    append(im, {im.comm, modes.shapes.entries.col(2 * i + 1)});
-  }
-  MultiVector shapes = re;
-  append(shapes, im);
-  if (which.empty()) return shapes;
-  const auto phi = [&](const MatrixXcd& weights) {
-    return MultiVector{re.comm, re.entries * weights.real() - im.entries * weights.imag()};
-  };
-  append(shapes, P.solve_transposed(dynamic_images(basis, Side::left, lambda, phi)));
-  orthonormalise(shapes, negligible * negligible);
-  return shapes;
 }
 
 /// P^-1 r of each force, at the frequency of its largest residual. Small ones are left out unless all are small.
@@ -274,13 +205,16 @@ MultiVector corrections(const HarmonicBasis& basis, const std::vector<double>& o
       forces.push_back(force);
       lambda.emplace_back(0, at);
       a.conservativeResize(Eigen::NoChange, a.cols() + 1);
-      a.rightCols(1) = solve_at(at, basis, basis.size()).a[which].col(force);
+      a.rightCols(1) = solve_at(at, basis).a[which].col(force);
     }
     if (forces.empty()) continue;
     const auto y = [&](const MatrixXcd& weights)
     { return kept_rows(combination_of_shapes(basis.on, (a * weights).real()), basis.equations.point.contact); };
-    MultiVector residuals =
-        dynamic_images(basis, side, Eigen::VectorXcd::Map(lambda.data(), static_cast<Index>(lambda.size())), y);
+    const MatrixXcd one = MatrixXcd::Identity(a.cols(), a.cols());
+    MatrixXcd parts(a.cols(), 2 * a.cols()); // the real parts of all, then the imaginary parts
+    parts << one, Complex(0, -1) * one;
+    MultiVector residuals = dynamic_forces(basis.on, basis.equations.point, side,
+                                           {Eigen::VectorXcd::Map(lambda.data(), a.cols()), parts, y});
     residuals.entries.leftCols(a.cols()) -= basis.equations.of(side).columns.entries(Eigen::all, forces);
     append(result, side == Side::right ? P.solve(residuals) : P.solve_transposed(residuals));
   }
@@ -295,47 +229,34 @@ struct PartResponse
   Index shapes = 0;
 };
 
-/// Extends a basis until its residuals are small, or no correction adds to it. Nothing where it would grow too large.
+/// Extends a basis until its residuals are small, once more after they first are, or no correction adds to it. Nothing
+/// where it would grow too large.
 std::optional<PartResponse> solve_part(const Equations& equations, const std::vector<double>& omega,
                                        ShiftInvert& pencil, const ResponseOptions& options)
 {
-  const std::vector<Index> near = modes_near(equations.modes, omega.front(), omega.back());
-  if (3 * static_cast<Index>(near.size()) > options.shapes && omega.size() > 1) return std::nullopt;
   const auto& [structure, interface, equilibrium] = equations.point.sliding;
   HarmonicBasis basis{equations, make_basis(structure, interface, sketches)};
   move_to(pencil, (omega.front() * omega.front() + omega.back() * omega.back()) / 2);
   MultiVector start = pencil.factor->solve(equations.of(Side::right).columns);
   append(start, pencil.factor->solve_transposed(equations.of(Side::left).columns));
-  append(start, shapes_of(basis, near, *pencil.factor));
   extend(basis, start);
-  MatrixXcd earlier; // H at all frequencies of the part, on the first `before` shapes
-  for (Index before = 0;;)
+  MatrixXcd before; // H at all frequencies of the part, without the last correction
+  for (;;)
   {
     end_if_asked(basis.on.T.comm);
+    const auto is_small = [](const HarmonicScan& found) { return found.means_of(found.defects).maxCoeff() <= 1; };
     std::vector<double> at = thinned(omega, few);
-    HarmonicScan found = scan(basis, at, basis.size(), options.tolerance);
-    if (found.means_of(found.defects).maxCoeff() <= 1 && at.size() < omega.size())
-    {
-      at = omega;
-      found = scan(basis, at, basis.size(), options.tolerance);
-    }
-    const bool small = found.means_of(found.defects).maxCoeff() <= 1, large = basis.size() > options.shapes;
-    if (!small && large && omega.size() > 1) return std::nullopt;
-    const Index size = basis.size();
-    bool ended = (small && before > 0) || (large && basis.size() > 2 * options.shapes);
-    if (!ended)
-    {
-      ended = extend(basis, corrections(basis, at, found, *pencil.factor)) == 0;
-      if (!ended || before == 0)
-      {
-        before = size;
-        earlier = at.size() == omega.size() ? found.receptance : MatrixXcd();
-      }
-    }
+    HarmonicScan found = scan(basis, at, options.tolerance);
+    if (is_small(found) && at.size() < omega.size()) found = scan(basis, at = omega, options.tolerance);
+    const bool small = is_small(found), whole = at.size() == omega.size();
+    if (!small && basis.size() > options.shapes && omega.size() > 1) return std::nullopt;
+    bool ended = (small && before.size() > 0) || basis.size() > 2 * options.shapes;
+    if (!ended && whole) before = found.receptance;
+    ended = ended || extend(basis, corrections(basis, at, found, *pencil.factor)) == 0;
     if (!ended) continue;
-    if (at.size() < omega.size()) found = scan(basis, omega, basis.size(), options.tolerance);
-    if (earlier.size() == 0) earlier = scan(basis, omega, before, options.tolerance).receptance;
-    return PartResponse{found, earlier, basis.size()};
+    if (!whole) found = scan(basis, omega, options.tolerance);
+    if (before.size() == 0) before = found.receptance;
+    return PartResponse{found, before, basis.size()};
   }
 }
 

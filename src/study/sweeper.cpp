@@ -179,11 +179,6 @@ private:
     }
   }
 
-  ModeForms forms(const Followed& before, const Followed& now)
-  {
-    return model_.forms({before.values, before.reversed}, before.modes, {now.values, now.reversed}, now.modes);
-  }
-
   /// What counts as clear where a step cannot be halved any further.
   double least_clear(const Followed& before, const Followed& now)
   {
@@ -214,7 +209,7 @@ private:
   void advance(Followed& before, Followed& now, int depth, Division& division)
   {
     const bool divisible = std::abs(now.values[0] - before.values[0]) > division.tolerance;
-    const ModeForms between_both = forms(before, now);
+    const ModeForms between_both = forms_between(before.modes, now.modes);
     std::vector<Match> matches = follow(between_both, clear_mac);
     const bool clear = all_clear(before, matches);
     if (divisible && (!clear || may_change_stability(before, now, matches)) &&
@@ -343,7 +338,7 @@ private:
   {
     const auto point_at = [&](double value) { return evaluate(between_points(now, value)); };
     const auto match = [&](const Followed& from, const Followed& to)
-    { return follow(forms(from, to), least_clear(from, to)); };
+    { return follow(forms_between(from.modes, to.modes), least_clear(from, to)); };
     for (Threshold& threshold :
          find_thresholds({point_at, match, problem_.modes.band, tolerance, sweep_.tracks}, before, now, matches))
       sweep_.thresholds.push_back(std::move(threshold));

@@ -153,32 +153,9 @@ std::optional<ContactChange> SweptModel::contact_change(const SweptPlace& from, 
   return ContactChange{before, behind};
 }
 
-ModeForms SweptModel::forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to,
-                            const PointModes& second)
-{
-  if (first.pairs.empty() || second.pairs.empty() || same_pairs_closed(from, to)) return forms_between(first, second);
-  const auto expand = [&](const SweptPlace& place, const PointModes& modes)
-  {
-    go_to(place);
-    return ExpandedModes{modes.pairs, vectors(modes, Side::right), vectors(modes, Side::left)};
-  };
-  const ExpandedModes before = expand(from, first), now = expand(to, second);
-  const Structure& structure = model_->structure;
-  Owned<Mat> C = sliding_damping({structure, model_->interface, equilibrium_at(to)});
-  if (structure.K_loss.get()) C = without_loss(C, structure);
-  return forms_between(before, now, structure.M, C);
-}
-
 Eigen::Index SweptModel::shapes() const
 {
   return basis_ ? basis_->basis.shapes() : 0;
-}
-
-MultiVector SweptModel::vectors(const PointModes& modes, Side side) const
-{
-  const auto& [structure, interface] = *model_;
-  const ClosedContact contact = eliminate_closed_pairs(structure, interface, known_.at(at_).equilibrium.closed);
-  return expanded(*basis_, contact, modes.pairs, side);
 }
 
 } // namespace squeal

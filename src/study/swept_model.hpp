@@ -37,10 +37,6 @@ public:
   /// Gives back the memory of a point.
   void forget(const SweptPlace& place);
 
-  /// The vectors of modes found at the point visited last, in the structure's degrees of freedom: the real parts of
-  /// all, then the imaginary ones.
-  MultiVector vectors(const PointModes& modes, Side side) const;
-
   /// Whether the same pairs are closed at two points, and the same of them rigid.
   bool same_pairs_closed(const SweptPlace& a, const SweptPlace& b);
 
@@ -50,9 +46,6 @@ public:
   /// The first change of contact that is found on the way between two points of a line: of a pair that is closed at one
   /// of them alone, to `tolerance` of the first number; nothing: there is none.
   std::optional<ContactChange> contact_change(const SweptPlace& from, const SweptPlace& to, double tolerance);
-
-  /// Between the modes of two points of a line.
-  ModeForms forms(const SweptPlace& from, const PointModes& first, const SweptPlace& to, const PointModes& second);
 
   /// At the point visited last; null: at none.
   const BrakeModel* model() const { return model_ ? &*model_ : nullptr; }

@@ -297,7 +297,7 @@ Followed followed(double value, const std::vector<double>& growth)
 std::vector<Match> as_subspace(const Followed& from, const Followed& to)
 {
   const bool near = std::abs(from.values[0] - to.values[0]) < 0.1;
-  return {{near ? 0 : 1, 1, 3, 0}, {near ? 1 : 0, 1, 3, 0}, {2, 1, 3, 0}};
+  return {{near ? 0 : 1, 1, 3}, {near ? 1 : 0, 1, 3}, {2, 1, 3}};
 }
 
 } // namespace

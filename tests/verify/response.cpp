@@ -48,7 +48,7 @@ struct Driven
     for (PetscInt i = 0; i < count; ++i) all.push_back(static_cast<int>(i));
     const PencilOptions pencil;
     return find_response(
-        {{model.structure, model.interface, equilibrium}, linearised, {}, probes, all, frequencies, options, pencil});
+        {{model.structure, model.interface, equilibrium}, linearised, probes, all, frequencies, options, pencil});
   }
 };
 

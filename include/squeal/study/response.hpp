@@ -3,15 +3,15 @@
 /// force at a probe, along its direction. With p_i the row of probe i and Q of section 13,
 ///     H_ji(omega) = p_j'Z q_i,     Q(omega) q_i = Y'p_i.
 ///
-/// All frequencies of a part of the band are solved on one basis, which starts from the modes of the equilibrium that
-/// are there. Residuals of the full problem and of its transpose extend it. The error of H is the product of both.
+/// All frequencies of a part of the band are solved on one basis. Residuals of the full problem and of its transpose
+/// extend it. The error of H is the product of both.
 /// Where modes are unstable, H is formal: no vibration settles on it.
 #include "squeal/algebra/pencil_factor.hpp"
+#include "squeal/base/outcome.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
-#include "squeal/modes/modes.hpp"
 
 #include <complex>
-#include <span>
+#include <vector>
 
 namespace squeal
 {
@@ -41,9 +41,8 @@ struct ResponseProblem
 {
   SlidingEquilibrium sliding;
   const LinearisedSliding& linearised;
-  std::span<const ComplexMode> modes; // known ones; may be empty
-  Mat probes = nullptr;               // a row a probe
-  std::vector<int> excitations;       // their rows
+  Mat probes = nullptr;         // a row a probe
+  std::vector<int> excitations; // their rows
   std::vector<double> frequency_hz;
   const ResponseOptions& options;
   const PencilOptions& pencil;
