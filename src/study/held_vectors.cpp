@@ -77,13 +77,16 @@ AtHeldVectors at_held_vectors(const SlidingEquilibrium& sliding, const HeldVecto
   const std::size_t count = vectors.count();
   const MultiVector M_right = product(structure.M, vectors.right), K_right = product(structure.K, vectors.right),
                     loss_right = product_or_zero(structure.K_loss, vectors.right);
-  MultiVector C_right = product(sliding_damping(sliding), vectors.right);
-  if (structure.K_loss.get()) C_right.entries -= loss_right.entries / structure.loss_omega;
-  const MatrixXd M = inner_products(vectors.left, M_right), C = inner_products(vectors.left, C_right),
+  const auto damped = [&](Mat C) // without what C has for the losses
+  {
+    MultiVector force = product(C, vectors.right);
+    if (structure.K_loss.get()) force.entries -= loss_right.entries / structure.loss_omega;
+    return force;
+  };
+  const MatrixXd M = inner_products(vectors.left, M_right),
+                 C = inner_products(vectors.left, damped(sliding_damping(sliding))),
                  K = inner_products(vectors.left, K_right), L = inner_products(vectors.left, loss_right);
-  MultiVector own_C_right = product(structure.C, vectors.right);
-  if (structure.K_loss.get()) own_C_right.entries -= loss_right.entries / structure.loss_omega;
-  const MatrixXd m = inner_products(vectors.right, M_right), c = inner_products(vectors.right, own_C_right),
+  const MatrixXd m = inner_products(vectors.right, M_right), c = inner_products(vectors.right, damped(structure.C)),
                  k = inner_products(vectors.right, K_right), l = inner_products(vectors.right, loss_right);
   AtHeldVectors held;
   for (std::size_t j = 0; j < count; ++j)

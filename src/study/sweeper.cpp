@@ -63,7 +63,7 @@ public:
   }
 
 private:
-  /// Finds the pairs that are closed at every point, of design points at the first ones, and the basis.
+  /// Finds the pairs that are closed at every point, of design points at the first ones.
   void prepare(const std::vector<SweepLine>& lines)
   {
     std::size_t points = 0;
@@ -77,23 +77,6 @@ private:
         model_.prepare({values, line.reversed});
       }
     if (model_.model()) tolerance_ = tolerance_on(model_.model()->structure);
-    if (problem_.settings.stages != SweepStages::modes) return;
-    train(lines.front());
-    if (lines.size() > 1) train(lines.back());
-  }
-
-  /// Makes the basis by the ends and the middle of a line that has points between them, which then need few
-  /// corrections.
-  void train(const SweepLine& line)
-  {
-    if (line.points.size() < 4) return;
-    const std::size_t last = line.points.size() - 1;
-    for (const std::size_t place : {last, std::size_t{0}, last / 2})
-    {
-      end_if_asked(comm_);
-      const SweptPlace at{line.points[place], line.reversed};
-      if (model_.equilibrium_at(at).outcome.kind == OutcomeKind::converged) model_.train_at(at, tolerance_);
-    }
   }
 
   void run_line(const SweepLine& line)

@@ -85,12 +85,7 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
       throw Error(format("the number of contact pairs changes from %zu to %zu", common.size(), rigid.size()));
     for (std::size_t i = 0; i < common.size(); ++i) common[i] = common[i] && rigid[i];
     if (!basis_) basis_ = make_modes_basis(basis_problem(equilibrium), common);
-    if (common != basis_->closed)
-    {
-      rebase(*basis_, basis_problem(equilibrium), common);
-      trained_.clear(); // their vectors are on the basis before
-    }
-    if (auto known = trained_.extract(place)) return std::move(known.mapped());
+    if (common != basis_->closed) rebase(*basis_, basis_problem(equilibrium), common);
     modes = find_point_modes(
         *basis_, {{model_->structure, model_->interface, equilibrium}, problem_.modes.band, tolerance, end_if_asked_});
   }
@@ -103,12 +98,6 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
     modes.outcome = {OutcomeKind::not_converged, error.what(), 0, 0};
   }
   return modes;
-}
-
-void SweptModel::train_at(const SweptPlace& place, double tolerance)
-{
-  PointModes modes = modes_at(place, tolerance);
-  if (modes.outcome.kind == OutcomeKind::converged) trained_[place] = std::move(modes);
 }
 
 void SweptModel::forget(const SweptPlace& place)

@@ -31,9 +31,6 @@ public:
   const Equilibrium& equilibrium_at(const SweptPlace& place) { return known_at(place).equilibrium; }
   PointModes modes_at(const SweptPlace& place, double tolerance);
 
-  /// Makes the basis by a point, whose modes are then at hand when they are asked for next.
-  void train_at(const SweptPlace& place, double tolerance);
-
   /// Gives back the memory of a point.
   void forget(const SweptPlace& place);
 
@@ -73,7 +70,6 @@ private:
   std::map<SweptPlace, Known> known_{};
   std::vector<char> at_every_{}; // pairs closed and rigid at every point prepared
   std::optional<ModesBasis> basis_{};
-  std::map<SweptPlace, PointModes> trained_{};
 };
 
 } // namespace squeal
