@@ -193,7 +193,7 @@ ExaminedOrbit examine(BranchCorrector& corrector, CorrectedOrbit corrected, Exam
   corrector.family.set_parameter(examined.corrected.parameter);
   if (corrector.family.measure) examined.measures = corrector.family.measure(orbit);
   if (wanted == Examined::measures_alone) return examined;
-  examined.multipliers = find_multipliers(problem_of(corrector), corrector.options, orbit, {}).multipliers;
+  examined.multipliers = find_multipliers(problem_of(corrector), corrector.options, orbit).multipliers;
   corrector.columns += examined.multipliers.periods;
   return examined;
 }

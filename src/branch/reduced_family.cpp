@@ -336,7 +336,6 @@ SlowMotions ReducedFamily::slow_motions(double period, Vec start)
   SlowMotions slow = slow_motions_of(spectrum, own_, own_coordinates(), start);
   slow.periods = 2;
   add_changes(multipliers_along(spectrum, map, period, moved), 1, slow);
-  slow.confirmed = true; // these are its own
   return slow;
 }
 

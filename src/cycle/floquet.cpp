@@ -139,43 +139,6 @@ RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, V
   return result;
 }
 
-/// Of as many large multipliers both ways; a value within `margin` of the limit may fall on either side. Lists that are
-/// cut off are compared above their smallest values.
-bool as_many_above(double limit, const std::vector<Complex>& a, const std::vector<Complex>& b)
-{
-  constexpr double margin = 5e-3;
-  for (const std::vector<Complex>* values : {&a, &b}) // a pair that would exceed the number is left out whole
-    if (static_cast<int>(values->size()) >= deciding_values.at_most - 1)
-      limit = std::max(limit, std::abs(values->back()) + 2 * margin);
-  const auto above = [](double least, const std::vector<Complex>& values)
-  { return std::count_if(values.begin(), values.end(), [&](Complex value) { return std::abs(value) > least; }); };
-  return above(limit + margin, a) <= above(limit - margin, b) && above(limit + margin, b) <= above(limit - margin, a);
-}
-
-/// Whether each value of `a` above the limit has one of `b` that is no further from it than 1 is from its modulus: none
-/// can have crossed 1 from the one to the other, and none is missing there.
-bool have_partners(double limit, const std::vector<Complex>& a, const std::vector<Complex>& b)
-{
-  constexpr double margin = 5e-3; // of values next to 1
-  std::vector<Complex> large;
-  for (const Complex value : a)
-    if (std::abs(value) > limit) large.push_back(value);
-  if (large.size() > b.size()) return false;
-  const std::vector<std::size_t> places = nearest_places(large, b);
-  for (std::size_t i = 0; i < large.size(); ++i)
-    if (std::abs(b[places[i]] - large[i]) > std::max(margin, std::abs(1 - std::abs(large[i])))) return false;
-  return true;
-}
-
-/// The same both ways. Lists that are cut off are compared above their smallest values.
-bool alike(double limit, const std::vector<Complex>& a, const std::vector<Complex>& b)
-{
-  for (const std::vector<Complex>* values : {&a, &b}) // a pair that would exceed the number is left out whole
-    if (static_cast<int>(values->size()) >= deciding_values.at_most - 1)
-      limit = std::max(limit, std::abs(values->back()) + 1e-2);
-  return have_partners(limit, a, b) && have_partners(limit, b, a);
-}
-
 /// Real modes where the band of the complex ones ends too near the cycle's frequency for its multipliers.
 RealModes modes_beyond_band(const CycleProblem& problem)
 {
@@ -183,15 +146,6 @@ RealModes modes_beyond_band(const CycleProblem& problem)
   const double frequency = problem.unstable.modes.front().frequency_hz();
   if (highest_frequency(problem.modes) > near * frequency) return {};
   return real_modes_beyond(problem, far * frequency);
-}
-
-/// The number of motions that the pairs which the model eliminates take away.
-int eliminated_motions(const ReducedModel& model, const Interface& interface)
-{
-  int motions = 0;
-  for (std::size_t i = 0; i < model.sliding.size(); ++i)
-    motions += model.sliding[i] ? 1 + (is_undriven(interface, i) ? interface.directions : 0) : 0;
-  return motions;
 }
 
 /// Why a model of so many shapes is not made; empty: it fits the free memory.
@@ -232,10 +186,10 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   missing = lack_of_memory(problem.sliding.structure,
                            static_cast<Index>(2 * problem.modes.size() + beyond.shapes.size() + forces));
   if (!missing.empty()) return nullptr;
-  auto model = std::make_shared<ReducedModel>(
-      reduce(problem.sliding, problem.modes, roles,
-             {static_cast<int>(problem.modes.size()), 1e-5, attachments_on_recorded_contact, follow, &beyond,
-              problem.step.factor, kept_apart}));
+  auto model =
+      std::make_shared<ReducedModel>(reduce(problem.sliding, problem.modes, roles,
+                                            {static_cast<int>(problem.modes.size()), 1e-5,
+                                             attachments_on_recorded_contact, follow, &beyond, problem.step.factor}));
   return_freed_memory(); // of the factor that gave the attachments
   return model;
 }
@@ -249,31 +203,6 @@ void set_grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, const Oth
   if (other.steps == 0) return;
   ReducedMap finer{map.model, other.steps, map.theta, map.comm};
   add_changes(multipliers_along(spectrum, finer, period, contacts(RecordedPeriods::other)), other.part, slow);
-}
-
-/// Whether the model has as many shapes as the structure has motions.
-bool holds_every_motion(const ReducedModel& model, int eliminated, Vec state)
-{
-  return model.size() + eliminated == dofs_of(state);
-}
-
-/// Whether three quarters of the shapes give as many multipliers above 0.95.
-bool confirmed_by_fewer_shapes(const ReducedMap& map, double period, std::span<const StepRecord> contacts,
-                               const std::vector<Complex>& values)
-{
-  const ReducedModel smaller = truncated(map.model, (3 * map.model.size() + 3) / 4);
-  ReducedMap few{smaller, map.steps, map.theta, map.comm};
-  return as_many_above(0.95, values, large_multipliers(few, period, contacts, deciding_values).values);
-}
-
-/// Whether the model without its highest modes has the same multipliers above 0.95. The attachments stay: friction on
-/// pairs without their own flexibility is another problem.
-bool confirmed_by_fewer_modes(const ReducedMap& map, double period, std::span<const StepRecord> contacts,
-                              const std::vector<Complex>& values)
-{
-  const ReducedModel smaller = without_modes_apart(map.model);
-  ReducedMap few{smaller, map.steps, map.theta, map.comm};
-  return alike(0.95, values, large_multipliers(few, period, contacts, deciding_values).values);
 }
 
 SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, const OtherSteps& other, double period,
@@ -304,9 +233,6 @@ SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, cons
   slow.periods = none.periods;
   set_grid_errors(spectrum, own, other, period, contacts, slow);
   slow.without_known = taking_out_known(spectrum, coordinates);
-  slow.confirmed = holds_every_motion(*model, eliminated_motions(*model, problem.sliding.interface), start) ||
-                   confirmed_by_fewer_shapes(own, period, recorded, spectrum.values) ||
-                   confirmed_by_fewer_modes(own, period, recorded, spectrum.values);
   slow.correct = [model, correct = std::move(slow.correct)](Complex m, Vec real, Vec imaginary)
   { correct(m, real, imaginary); };
   return slow;
@@ -346,7 +272,7 @@ Verdict examine(const CycleProblem& problem, const CycleOptions& options, const 
                                         problem.settings.tolerance);
   Progress progress(comm_of(orbit.state), "cycle, verdict", 1);
   ConvergenceLog log{progress};
-  return judge(found, options.shooting, log, orbit, other_unstable_states(problem));
+  return judge(found, options.shooting, log, orbit);
 }
 
 } // namespace squeal

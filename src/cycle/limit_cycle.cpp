@@ -102,13 +102,6 @@ std::vector<State> other_unstable_motions(const CycleProblem& problem)
   return motions;
 }
 
-std::vector<Owned<Vec>> other_unstable_states(const CycleProblem& problem)
-{
-  std::vector<Owned<Vec>> states;
-  for (const State& motion : other_unstable_motions(problem)) states.push_back(state_of(motion.u, motion.v));
-  return states;
-}
-
 std::optional<State> cycle_start(const CycleProblem& problem)
 {
   const CycleStartKind kind = problem.settings.start.kind;
@@ -166,7 +159,7 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
                       limited_from,
                       is_cycle,
                       problem.given_rounds};
-  start.other_unstable = other_unstable_states(problem);
+  start.other_unstable = problem.unstable.modes.size() - 1;
   return find_cycle_from(problem, options, start, estimated_preconditioner(problem, options.band_factor),
                          is_cycle ? 0 : problem.settings.free_periods);
 }

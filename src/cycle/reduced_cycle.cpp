@@ -96,7 +96,7 @@ void build_model(ReducedSearch& search, double amplitude)
   }
   search.model = reduce(problem.sliding, problem.modes, search.active,
                         {search.options.reduced_modes, new_attachment, attachments_of(search), sliding, &search.real,
-                         problem.step.factor, kept_apart});
+                         problem.step.factor});
   search.energy = energy_matrices(search.model);
   describe_model(search);
   search.fidelity.reduction_seconds += MPI_Wtime() - clock;

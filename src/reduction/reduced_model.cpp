@@ -255,49 +255,6 @@ ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibr
   return result;
 }
 
-namespace
-{
-
-/// The model on fewer shapes, the columns of `basis`, without the shapes themselves.
-ReducedModel on_shapes(const ReducedModel& model, const MatrixXd& basis, Index slow)
-{
-  ReducedModel result;
-  for (MatrixXd ReducedModel::*const part : {&ReducedModel::M, &ReducedModel::C, &ReducedModel::K, &ReducedModel::M_z,
-                                             &ReducedModel::C_z, &ReducedModel::K_z})
-    result.*part = basis.transpose() * (model.*part * basis);
-  result.H = basis.transpose() * model.H;
-  result.force = basis.transpose() * model.force;
-  result.G = model.G * basis;
-  result.active = model.active;
-  result.directions = model.directions;
-  result.friction = model.friction;
-  result.gap = model.gap;
-  result.compliance = model.compliance;
-  result.drive = model.drive;
-  result.reactions = model.reactions;
-  result.omega = model.omega;
-  result.slow = slow;
-  return result;
-}
-
-} // namespace
-
-ReducedModel truncated(const ReducedModel& model, Index size)
-{
-  return on_shapes(model, MatrixXd::Identity(model.size(), size), std::min(model.slow, size));
-}
-
-ReducedModel without_modes_apart(const ReducedModel& model)
-{
-  const Index size = model.size(), apart = model.apart.cols();
-  MatrixXd basis = MatrixXd::Identity(size, size);
-  if (apart > 0) Eigen::HouseholderQR<MatrixXd>(model.apart).householderQ().applyThisOnTheLeft(basis);
-  basis = basis.rightCols(size - apart).eval();
-  Index slow = 0;
-  basis *= by_falling_period(basis.transpose() * model.M_z * basis, model.omega, slow);
-  return on_shapes(model, basis, slow);
-}
-
 ReducedState coordinates(const ReducedModel& model, const Structure& structure, Vec du, Vec v)
 {
   const Owned<Vec> force = zeros_like(du), momentum = zeros_like(v);

@@ -152,22 +152,10 @@ ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction&
     for (const Vec part : {mode->real.get(), mode->imaginary.get()})
       shapes.push_back({std::abs(mode->lambda.imag()), part});
   for (const ModeShape& shape : shapes_above(reduction.real, modes)) shapes.push_back(shape);
-  const auto count = static_cast<std::ptrdiff_t>(std::ceil(reduction.apart * static_cast<double>(shapes.size())));
-  if (count > 0)
-  {
-    std::vector<double> frequencies;
-    for (const ModeShape& shape : shapes) frequencies.push_back(shape.frequency);
-    std::sort(frequencies.begin(), frequencies.end(), std::greater<>());
-    const double limit = frequencies[static_cast<std::size_t>(count) - 1];
-    std::stable_partition(shapes.begin() + 2, shapes.end(),
-                          [limit](const ModeShape& shape) { return shape.frequency < limit; });
-  }
-  const Index of_apart = std::min(count, static_cast<std::ptrdiff_t>(shapes.size()) - 2);
   std::vector<Vec> columns;
   for (const ModeShape& shape : shapes) columns.push_back(shape.shape);
   columns.insert(columns.end(), reduction.more.begin(), reduction.more.end());
-  return {product(contact.Z, kept_rows(columns_of(columns), contact)), static_cast<Index>(reduction.more.size()),
-          of_apart};
+  return {product(contact.Z, kept_rows(columns_of(columns), contact)), static_cast<Index>(reduction.more.size())};
 }
 
 Eigen::SparseMatrix<double> sliding_forces(const Interface& interface, const std::vector<int>& active)
@@ -222,16 +210,15 @@ MultiVector make_basis(ReducedModel& model, const Attachments& attachments, cons
   const MatrixXd energy = energies(attachments, energy_of_modes, of_modes);
   Orthonormal basis{energy, MatrixXd(energy.rows(), 0)};
   extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
-  extend(basis, modal - modes.more - modes.apart - 2, 1e-6);
+  extend(basis, modal - modes.more - 2, 1e-6);
   extend(basis, modes.more, new_shape);
-  const Index before = basis.T.cols(), last = extend(basis, modes.apart, 1e-6).taken;
+  const Index of_modes_alone = basis.T.cols();
   const Extension attached = extend(basis, count, limits.threshold, limits.at_most);
   if (attached.lost > limits.most_lost)
     throw Error(format("reduced model: half of the free memory holds %ld of %ld attachment shapes, and %.2g of the "
                        "pairs' own compliance would be lost: a larger machine takes more",
                        static_cast<long>(attached.taken), static_cast<long>(attached.taken + attached.left_out),
                        attached.lost));
-  const Index of_modes_alone = before + last;
   model.modes = static_cast<int>(of_modes_alone);
   model.attachments = static_cast<int>(attached.taken);
   model.left_out = static_cast<int>(attached.left_out);
@@ -258,7 +245,6 @@ MultiVector make_basis(ReducedModel& model, const Attachments& attachments, cons
                     });
   const MatrixXd mass = symmetric_inner_products(X, M), turn = by_falling_period(mass, model.omega, model.slow);
   model.M_z = turn.transpose() * mass * turn;
-  model.apart = turn.middleRows(before, last).transpose();
   combine(X, turn);
   return X;
 }

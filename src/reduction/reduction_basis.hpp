@@ -10,15 +10,15 @@
 namespace squeal
 {
 
-/// Shapes of modes, then further ones. Those of the modes kept apart are the last ones.
+/// Shapes of modes, then further ones.
 struct ModeColumns
 {
   MultiVector columns;
-  Eigen::Index more = 0, apart = 0; // numbers of further shapes, and of those kept apart
+  Eigen::Index more = 0; // number of further shapes
 };
 
 /// The followed mode is the first; the others nearest to it in frequency. Real and imaginary parts. Then real modes.
-/// Shapes kept apart are the last ones. All as motions Z y that keep the eliminated pairs closed.
+/// All as motions Z y that keep the eliminated pairs closed.
 ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction,
                          const ClosedContact& contact);
 
@@ -45,8 +45,8 @@ struct AttachmentLimits
 };
 
 /// The basis: the modes, the attachments next to them, all by falling period, as motions. `energy_of_modes`: X'E X of
-/// the modes X; `of_modes`: F'B X. Sets the model's counts, what it leaves out (its compliance by forces), M_z, `slow`
-/// and `apart`. Energies of attachments are the condensed operator P E^-1 P', so that only those which the basis takes
+/// the modes X; `of_modes`: F'B X. Sets the model's counts, what it leaves out (its compliance by forces), M_z and
+/// `slow`. Energies of attachments are the condensed operator P E^-1 P', so that only those which the basis takes
 /// are solved for. Error: more compliance would be lost than may be.
 MultiVector make_basis(ReducedModel& model, const Attachments& attachments, const ModeColumns& modes,
                        const Eigen::MatrixXd& energy_of_modes, const Eigen::MatrixXd& of_modes, Mat M,

@@ -87,7 +87,7 @@ void add_verdict(Entry out, const Multipliers& multipliers)
              multipliers.offsets);
   if (out.has(multipliers.crossing != Crossing::none))
     out.show("crossing", "way in which the largest multiplier of an unstable cycle is out", multipliers.crossing);
-  out.text("refusal", "why Arnoldi took the place of the oblique projection", multipliers.refusal);
+  out.text("refusal", "why the whole matrix took the place of the oblique projection", multipliers.refusal);
   if (out.has(!multipliers.seen.empty())) out.list("seen", add_seen, multipliers.seen);
 }
 

@@ -64,8 +64,7 @@ double moved_by_grid(const Multipliers& multipliers, std::complex<double> value)
 void decide(Multipliers& multipliers, const Completeness& coverage);
 
 /// By oblique projection on approximate right and left vectors (src/README.md, section 6.9). `columns`: at most for the
-/// search beside them. Nothing, with the reason in `refusal`, where these vectors do not serve.
-std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodromy, PetscInt columns,
-                                                         std::string& refusal);
+/// search beside them. Undecided without values, with the reason, where these vectors do not serve.
+FloquetAnalysis multipliers_by_projection(const Monodromy& monodromy, PetscInt columns);
 
 } // namespace squeal

@@ -1,6 +1,6 @@
 #include "squeal/shooting/multipliers.hpp"
 
-#include "deflated_search.hpp"
+#include "monodromy.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/cost.hpp"
 #include "squeal/base/progress.hpp"
@@ -17,17 +17,6 @@ namespace
 
 using Complex = std::complex<double>;
 using Eigen::Index;
-
-/// A change of amplitude, the flow, and the other unstable motions.
-std::vector<Owned<Vec>> motions_that_may_grow(const OrbitProblem& problem, const Orbit& orbit,
-                                              const std::vector<Owned<Vec>>& other_unstable)
-{
-  std::vector<Owned<Vec>> motions;
-  motions.push_back(fluctuation_of(problem, orbit));
-  motions.push_back(copy_of(orbit.rate.get()));
-  for (const Owned<Vec>& motion : other_unstable) motions.push_back(copy_of(motion.get()));
-  return motions;
-}
 
 /// The multipliers of these places along eight periods on a grid of 8 N + 1 steps, by projection on the vectors of all
 /// of them; then what each is a period: the root that is nearest to the value.
@@ -185,17 +174,14 @@ bool largest_reaches_across(const Multipliers& multipliers)
          std::abs(std::abs(multipliers.values.front()) - 1) <= multipliers.errors.front();
 }
 
-FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
-                                 const std::vector<Owned<Vec>>& other_unstable)
+FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit)
 {
-  const bool dear = is_dear(problem.flow.work);
-  const PetscInt enough = dear ? 24 : 96; // columns of a search
   if (options.multipliers == 0) return {};
-  const PetscInt dofs = dofs_of(orbit.state), columns = options.multipliers > 0 ? options.multipliers : enough;
+  const PetscInt dofs = dofs_of(orbit.state);
   Monodromy monodromy{problem.flow, orbit};
   std::optional<Progress> progress;
   constexpr double expected_columns = 100;
-  if (dear)
+  if (is_dear(problem.flow.work))
   {
     progress.emplace(comm_of(orbit.state), "multipliers", expected_columns);
     monodromy.after_product = [&, done = 0.](std::size_t more) mutable
@@ -204,32 +190,15 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
       progress->update(done, format("%.0f products with the period's tangent", done));
     };
   }
-  const MultiplierMethod method = chosen_method(options, dofs);
-  if (method == MultiplierMethod::whole) return from_whole_matrix(monodromy, dofs);
-  std::string refusal;
-  std::optional<FloquetAnalysis> projected;
-  if (method == MultiplierMethod::oblique && problem.flow.slow_motions)
-    projected = multipliers_by_projection(monodromy, options.multipliers, refusal);
-  // where periods are dear, a search that decides takes longer than the cycle
-  const bool tries_another = options.multiplier_method == MultiplierMethod::automatic && !dear;
-  const auto is_decided = [](const FloquetAnalysis& found)
-  { return found.multipliers.stability != Stability::undecided; };
-  if (projected && (!tries_another || is_decided(*projected))) return std::move(*projected);
-  FloquetAnalysis result =
-      multipliers_by_search(monodromy, motions_that_may_grow(problem, orbit, other_unstable), columns);
-  if (projected) result.multipliers.periods += projected->multipliers.periods;
-  if (tries_another && !is_decided(result) && whole_is_affordable(problem.flow, dofs))
-  {
-    const long periods = result.multipliers.periods;
-    result = from_whole_matrix(monodromy, dofs);
-    result.multipliers.periods += periods;
-  }
-  else if (projected && !is_decided(result))
-  {
-    projected->multipliers.periods = result.multipliers.periods;
-    return std::move(*projected);
-  }
-  result.multipliers.refusal = projected ? projected->multipliers.would_decide : std::move(refusal);
+  if (chosen_method(options, dofs) == MultiplierMethod::whole) return from_whole_matrix(monodromy, dofs);
+  FloquetAnalysis result = multipliers_by_projection(monodromy, options.multipliers);
+  if (options.multiplier_method != MultiplierMethod::automatic || !whole_is_affordable(problem.flow, dofs) ||
+      result.multipliers.stability != Stability::undecided)
+    return result;
+  const Multipliers projected = std::move(result.multipliers);
+  result = from_whole_matrix(monodromy, dofs);
+  result.multipliers.periods += projected.periods;
+  result.multipliers.refusal = projected.would_decide;
   return result;
 }
 

@@ -319,21 +319,13 @@ Deflation beside_known(const Monodromy& monodromy, const SlowMotions& slow, cons
   };
 }
 
-Completeness coverage_of(const SlowMotions& slow, const DeflatedSearch& search)
+Completeness coverage_of(const DeflatedSearch& search)
 {
-  if (!slow.confirmed)
-    return {false, "the reduced model has another number of large multipliers with fewer modes: more of them "
-                   "(modes.band) would decide"};
   if (search.bounded) return {true, ""};
   return {false, format("beside the slowest motions a Ritz value of %.4f has a residual of %.1e: a larger "
                         "-cycle_multipliers would decide",
                         std::abs(search.pair.lambda), search.residual)};
 }
-
-/// The largest pair, to what the projection may go on from.
-const SearchChoice largest_or_bounded{
-    [](const std::vector<DenseEigenpair>&, const StateBlock&) { return std::size_t{}; },
-    [](const DeflatedSearch& search) { return search.bounded || search.residual < 1e-3; }};
 
 /// The passes, and the search beside them. What that finds joins Q: a motion that the reduced model has not becomes one
 /// of the pairs, and what comes of pairs that have not settled goes. Returns why the vectors do not serve, or nothing.
@@ -348,10 +340,9 @@ std::string make_complete(const Monodromy& monodromy, const SlowMotions& slow, I
     coverage = {true, ""}; // a multiplier above 1 needs no other
     if (repels(passes)) return {};
     DeflatedSearch search{true}; // an exact approximation lacks nothing
-    if (slow.without_known)
-      search = search_beside(monodromy, beside_known(monodromy, slow, passes), {}, columns, largest_or_bounded);
+    if (slow.without_known) search = search_beside(monodromy, beside_known(monodromy, slow, passes), columns);
     searched += search.columns;
-    coverage = coverage_of(slow, search);
+    coverage = coverage_of(search);
     if (search.bounded || round == rounds) return {};
     if (extend(monodromy, combination(search.Q, parts_of(search.pair.y)), passes) == 0) return {};
   }
@@ -359,20 +350,27 @@ std::string make_complete(const Monodromy& monodromy, const SlowMotions& slow, I
 
 } // namespace
 
-std::optional<FloquetAnalysis> multipliers_by_projection(const Monodromy& monodromy, PetscInt columns,
-                                                         std::string& refusal)
+FloquetAnalysis multipliers_by_projection(const Monodromy& monodromy, PetscInt columns)
 {
   const Orbit& orbit = monodromy.orbit;
-  const SlowMotions slow = monodromy.flow.slow_motions(orbit.period, orbit.state);
-  refusal = slow.missing;
-  if (!refusal.empty()) return std::nullopt;
   FloquetAnalysis result;
   Multipliers& multipliers = result.multipliers;
   multipliers.method = MultiplierMethod::oblique;
+  const auto undecided = [&](const std::string& reason)
+  {
+    multipliers.stability = Stability::undecided;
+    multipliers.complete = false;
+    multipliers.would_decide = reason;
+    return std::move(result);
+  };
+  if (!monodromy.flow.slow_motions) return undecided("no approximate vectors are known");
+  const SlowMotions slow = monodromy.flow.slow_motions(orbit.period, orbit.state);
+  if (!slow.missing.empty()) return undecided(slow.missing);
   Passes passes;
   Completeness coverage;
-  refusal = make_complete(monodromy, slow, columns > 0 ? columns : 96, passes, coverage, multipliers.periods);
-  if (!refusal.empty()) return std::nullopt;
+  const std::string refusal =
+      make_complete(monodromy, slow, columns > 0 ? columns : 96, passes, coverage, multipliers.periods);
+  if (!refusal.empty()) return undecided(refusal);
   take_out_shift(passes);
   multipliers.trivial_error = passes.shift_distance;
   multipliers.periods += slow.periods + static_cast<long>(passes.image.columns());

@@ -88,7 +88,7 @@ Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* kno
     attempt.verdict.beside = known->verdict.beside;
   }
   else
-    attempt.verdict = judge(problem, options, log, attempt.found.orbit, start.other_unstable);
+    attempt.verdict = judge(problem, options, log, attempt.found.orbit);
   return attempt;
 }
 
@@ -236,7 +236,7 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   ShootingResult result;
   result.outcome = outcome_of(log.convergence, ending, found.found.orbit.residual);
   if (!found.converged() && goes_on && slips_one_way(problem, free)) note_slip(log.slips, result.outcome);
-  refuse_repelling(found.verdict, start.other_unstable.size(), result.outcome);
+  refuse_repelling(found.verdict, start.other_unstable, result.outcome);
   result.multipliers = std::move(found.verdict.floquet.multipliers);
   if (slow) result.outcome.reason += leaving_time(result.multipliers, found.found.orbit.period);
   result.orbit = std::move(found.found.orbit);

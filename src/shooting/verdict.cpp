@@ -74,15 +74,14 @@ long watched_periods(const Flow& flow, const ShootingOptions& options, const Con
 
 } // namespace
 
-Verdict judge(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, const Orbit& orbit,
-              const std::vector<Owned<Vec>>& other_unstable)
+Verdict judge(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, const Orbit& orbit)
 {
   Verdict verdict;
   Multipliers& multipliers = verdict.floquet.multipliers;
   const char* sought = "its multipliers were sought";
   try
   {
-    verdict.floquet = find_multipliers(problem, options, orbit, other_unstable);
+    verdict.floquet = find_multipliers(problem, options, orbit);
     multipliers.offsets = orbit.offsets.held;
     sought = "a motion beside it was watched";
     hold_against_motion(problem, options, log, orbit, verdict);

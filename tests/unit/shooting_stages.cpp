@@ -169,7 +169,7 @@ TEST_CASE("the multipliers' product is the exponential of the integrated diverge
   const StageResult found =
       shoot_in_full_space(problem.orbit, options, problem.log, evaluate(problem.orbit, problem.log, state, 6.287));
   REQUIRE(found.ending == StageEnding::converged);
-  const FloquetAnalysis analysis = find_multipliers(problem.orbit, options, found.orbit, {});
+  const FloquetAnalysis analysis = find_multipliers(problem.orbit, options, found.orbit);
   const auto& values = analysis.multipliers.values;
   REQUIRE(values.size() == 3);
   const std::complex<double> product =
@@ -177,24 +177,4 @@ TEST_CASE("the multipliers' product is the exponential of the integrated diverge
   CHECK(std::abs(product - std::exp(integrated_divergence(problem.model.flow, found.orbit))) < 1e-5);
   CHECK(analysis.multipliers.trivial_error < 1e-5);
   CHECK(energy_norm(problem.model.flow, analysis.fastest.real) == doctest::Approx(1).epsilon(1e-12));
-}
-
-TEST_CASE("a search finds the largest multiplier beside the shift in time")
-{
-  Problem problem(coupled, {1, 2}, 6.3);
-  ShootingOptions options;
-  const Owned<Vec> state = state_on_first_rank({1.9, 0.05}, {0, 0});
-  const StageResult found =
-      shoot_in_full_space(problem.orbit, options, problem.log, evaluate(problem.orbit, problem.log, state, 6.287));
-  const FloquetAnalysis whole = find_multipliers(problem.orbit, options, found.orbit, {});
-  options.multipliers = 4;
-  options.multiplier_method = MultiplierMethod::arnoldi;
-  std::vector<Owned<Vec>> other;
-  other.push_back(state_of(problem.model.axes[1], problem.model.zero));
-  const FloquetAnalysis few = find_multipliers(problem.orbit, options, found.orbit, other);
-  REQUIRE(!few.multipliers.values.empty());
-  CHECK(std::abs(few.multipliers.values[0] - whole.multipliers.values[0]) < 1e-4);
-  CHECK(few.multipliers.trivial_error < 1e-5);
-  options.multipliers = 0;
-  CHECK(find_multipliers(problem.orbit, options, found.orbit, {}).multipliers.stability == Stability::not_examined);
 }

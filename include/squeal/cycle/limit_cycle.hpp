@@ -65,9 +65,6 @@ CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& set
 /// Those of the unstable modes that are not followed, at their estimated amplitudes, about the equilibrium.
 std::vector<State> other_unstable_motions(const CycleProblem& problem);
 
-/// The same, as states (u, v) of a shooting.
-std::vector<Owned<Vec>> other_unstable_states(const CycleProblem& problem);
-
 /// The state that the scene asks the search to start from. It is the modes at their estimated amplitudes, the followed
 /// one at an amplitude, or the state given. Nothing where there is no amplitude to start from.
 std::optional<State> cycle_start(const CycleProblem& problem);

@@ -53,7 +53,6 @@ struct ReducedModel
   double lost_compliance = 0;                     // [-] mean part of the active pairs' own compliance that is theirs
   Eigen::VectorXd of_left_out; // [m/N] per active pair: of its own compliance, what they have; empty: nothing
   Eigen::Index slow = 0;       // those that swing by less than four times omega, the first ones
-  Eigen::MatrixXd apart;       // coordinates of what the modes kept apart add to all others, orthonormal columns
 
   int size() const { return static_cast<int>(M.rows()); }
 };
@@ -80,9 +79,6 @@ inline constexpr PetscInt all_attachments = std::numeric_limits<PetscInt>::max()
 /// columns, 200 after 121 and 80 after 101. The brake of 239 246 needs 82 from 300 of 2997.
 inline constexpr PetscInt attachments_on_recorded_contact = 300;
 
-/// Part of its modes that is kept apart: what they change says what those beyond them may.
-inline constexpr double kept_apart = 0.25;
-
 /// How a model is reduced.
 struct Reduction
 {
@@ -92,8 +88,7 @@ struct Reduction
   bool sliding = false;                   // the active pairs slide along the drive throughout
   const RealModes* real = nullptr;        // frictionless ones; those above the complex modes are taken, too. Null: none
   FactorOptions factor{};
-  double apart = 0;            // part of the modes, those of highest frequency, that `apart` of the model holds
-  std::span<const Vec> more{}; // further shapes, which a model with modes kept apart does not take
+  std::span<const Vec> more{}; // further shapes
 };
 
 /// The model whose other closed pairs slide throughout. Collective. Error: as of eliminate_closed_pairs; K + omega^2 M
@@ -130,12 +125,6 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
 /// E_factor and M_factor are not made. The model's friction must be free. Collective.
 ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibrium& about,
                                 const SlidingEquilibrium& other, const PairRoles& roles);
-
-/// The model on its first `size` shapes, those of longest period, without the shapes themselves.
-ReducedModel truncated(const ReducedModel& model, Eigen::Index size);
-
-/// The model without what the modes kept apart add to its other shapes, and without the shapes themselves.
-ReducedModel without_modes_apart(const ReducedModel& model);
 
 /// Position and velocity about the equilibrium.
 struct ReducedState

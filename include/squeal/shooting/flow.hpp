@@ -28,9 +28,8 @@ struct SlowMotions
   std::function<void(Vec motion)> without_known;
   /// x = (A - m)^-1 x of a complex x, A that approximation of dPhi_T/dx.
   std::function<void(std::complex<double> m, Vec real, Vec imaginary)> correct;
-  bool confirmed = false; // another approximation has as many large values
-  std::string missing;    // why there are none
-  long periods = 0;       // integrated to find them
+  std::string missing; // why there are none
+  long periods = 0;    // integrated to find them
 };
 
 /// The steps in which a period is recorded.

@@ -2,9 +2,8 @@
 /// Floquet multipliers: eigenvalues of the monodromy matrix dPhi_T/dx at a periodic orbit (src/README.md, section 6.9).
 ///
 /// The matrix is formed whole where that takes no more columns than a projection. Else it is projected obliquely on
-/// approximate right and left vectors, where the flow knows some, or the largest value is sought in a block Arnoldi
-/// space. All use the flow's exact tangent. The shift in time, whose multiplier is 1, is the value near 1 whose vector
-/// is closest to d.
+/// approximate right and left vectors that the flow knows. Both use the flow's exact tangent. The shift in time, whose
+/// multiplier is 1, is the value near 1 whose vector is closest to d.
 ///
 /// Each multiplier has an error bar of its own. In a whole matrix none of a real positive one is smaller than the
 /// distance of the shift's own multiplier from 1; a projection's bars do not hold that.
@@ -94,10 +93,9 @@ struct FloquetAnalysis
   FastestMotion fastest;
 };
 
-/// All multipliers of a system whose whole matrix has at most 200 columns. Of a larger one those of the slow motions,
-/// or the largest one, sought in at most 96 columns on each grid of time. ShootingOptions may force a method.
-/// Collective. Error: as of the flow.
-FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit,
-                                 const std::vector<Owned<Vec>>& other_unstable);
+/// All multipliers of a system whose whole matrix has at most 200 columns. Of a larger one those of the slow motions;
+/// where these leave the verdict open and the whole matrix is affordable, all again. ShootingOptions may force a
+/// method. Collective. Error: as of the flow.
+FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit);
 
 } // namespace squeal

@@ -22,11 +22,10 @@ enum class MultiplierMethod
 {
   automatic, // by the columns that each takes
   whole,     // from the whole monodromy matrix
-  oblique,   // by projection on approximate right and left vectors; arnoldi where there are none
-  arnoldi,   // the largest one, in a block Arnoldi space
+  oblique,   // by projection on approximate right and left vectors
 };
 
-template <> inline constexpr std::array words_of<MultiplierMethod> = {"auto", "whole", "oblique", "arnoldi"};
+template <> inline constexpr std::array words_of<MultiplierMethod> = {"auto", "whole", "oblique"};
 
 /// Options -cycle_... of the solver.
 struct ShootingOptions

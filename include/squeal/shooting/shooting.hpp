@@ -16,8 +16,7 @@ struct ShootingStart
   double period = 0; // [s]
   std::vector<Vec>
       shapes{}; // the paper's phi_r, phi_i, phi_e: of the displacements and of the velocities alike; or none
-  std::vector<Owned<Vec>>
-      other_unstable{}; // motions (u, v) of other unstable modes, which an orbit may leave unexcited
+  std::size_t other_unstable = 0; // unstable modes that an orbit may leave unexcited
   double first_event =
       std::numeric_limits<double>::infinity(); // energy norm where a nonlinearity begins to limit growth
   bool is_cycle = false;                       // that of a cheaper model, or on which a motion has settled

@@ -27,8 +27,7 @@ struct Verdict
 
 /// Seeks the multipliers of an orbit, and holds them against motions beside it. Where the run is asked to end
 /// meanwhile, the verdict is cut short. Error: as of the flow.
-Verdict judge(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, const Orbit& orbit,
-              const std::vector<Owned<Vec>>& other_unstable);
+Verdict judge(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, const Orbit& orbit);
 
 /// An orbit that repels is no answer; with other unstable modes the motion need not be periodic at all. Not collective.
 void refuse_repelling(const Verdict& verdict, std::size_t other_unstable, Outcome& outcome);
