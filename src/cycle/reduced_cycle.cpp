@@ -190,14 +190,6 @@ void update_correction(ReducedSearch& search, const FreeMotion& motion)
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
 
-/// Tells the other ranks whether rank 0 asks for one more period; returns it. Collective.
-bool one_more_period(bool asked, MPI_Comm comm)
-{
-  int more = asked ? 1 : 0;
-  MPI_Bcast(&more, 1, MPI_INT, 0, comm);
-  return more != 0;
-}
-
 /// What shooting found, and in how many periods.
 struct Shot
 {
@@ -205,11 +197,12 @@ struct Shot
   long periods = 0;
 };
 
-/// Shoots from `start`, on one rank: its periods are integrated by `flow`.
-Shot shoot(const ReducedSearch& search, const ReducedCycle& start, const Flow& flow)
+/// Shoots from `start`. Every rank does so by itself, on periods that are the same on all.
+Shot shoot(const ReducedSearch& search, const ReducedCycle& start, ReducedMap& map)
 {
+  const Flow flow = flow_of(map, search.energy);
   const Preconditioner preconditioner = preconditioner_of(search.correction, own_coordinates());
-  Progress progress(PETSC_COMM_SELF, "reduced", 20);
+  Progress progress(map.comm, "reduced", 20);
   ConvergenceLog log{progress};
   const Owned<Vec> first = vector_of(start.state);
   OrbitProblem problem{flow, preconditioner, zeros_like(first), start.period, search.tolerance, 0};
@@ -220,51 +213,11 @@ Shot shoot(const ReducedSearch& search, const ReducedCycle& start, const Flow& f
   if (found.ending == StageEnding::converged)
     found = prefer_fewer_rounds(problem, shooting, log, 2, std::move(found)); // which spares the full model that test
   const bool at_rest = found.ending == StageEnding::collapsed;
-  return {{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0,
-           at_rest ? std::nan("") : found.orbit.residual},
-          log.convergence.periods};
-}
-
-/// Rank 0 shoots, and the other ranks integrate its periods along: they decide nothing, and cannot decide otherwise.
-Shot shoot_together(const ReducedSearch& search, const ReducedCycle& start, ReducedMap& map)
-{
-  Shot shot{start, 0};
-  Flow flow = flow_of(map, search.energy);
-  const auto together = flow.integrate;
-  bool alone = true; // what goes wrong is not known to the other ranks
-  flow.integrate = [&](double period, Vec from, Vec end, Vec rate)
-  {
-    alone = false;
-    one_more_period(true, map.comm);
-    together(period, from, end, rate);
-    alone = true;
-  };
-  std::string problem;
-  if (rank_of(map.comm) == 0)
-  {
-    try
-    {
-      shot = shoot(search, start, flow);
-    }
-    catch (const std::exception& error)
-    {
-      if (!alone) throw;
-      problem = error.what();
-    }
-    one_more_period(false, map.comm);
-  }
-  else
-    for (const Owned<Vec> state = vector_of(start.state); one_more_period(false, map.comm);)
-      together(start.period, state, state, nullptr);
-  agree(map.comm, problem);
-  double values[] = {shot.cycle.converged ? 1. : 0., shot.cycle.period, shot.cycle.residual,
-                     static_cast<double>(shot.periods)};
-  MPI_Bcast(values, 4, MPI_DOUBLE, 0, map.comm);
-  shot.cycle.converged = values[0] > 0;
-  shot.cycle.period = values[1];
-  shot.cycle.residual = values[2];
-  shot.periods = static_cast<long>(values[3]);
-  share_state(shot.cycle.state, map.comm);
+  Shot shot{{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0,
+             at_rest ? std::nan("") : found.orbit.residual},
+            log.convergence.periods};
+  share_state(shot.cycle.state, map.comm); // ranks of other processors may round otherwise
+  MPI_Bcast(&shot.cycle.period, 1, MPI_DOUBLE, 0, map.comm);
   return shot;
 }
 
@@ -305,7 +258,7 @@ ReducedCycle find_reduced_cycle(ReducedSearch& search, const ReducedCycle& start
 {
   const double clock = MPI_Wtime();
   ReducedMap map = period_map_of(search, steps);
-  Shot shot = shoot_together(search, start, map);
+  Shot shot = shoot(search, start, map);
   shot.cycle.energy = mean_energy(map, shot.cycle.period, shot.cycle.state);
   search.fidelity.reduced_periods += shot.periods + 1;
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;

@@ -17,15 +17,6 @@ namespace
 // Numbers that a step reads, 1 MB in 50 us. Its three messages take some microseconds each on a node.
 constexpr double least_to_share = 1e6 / sizeof(double);
 
-std::vector<Eigen::Index> normal_rows(const ReducedModel& model)
-{
-  const PairRows<Eigen::Index> rows(model.directions);
-  std::vector<Eigen::Index> result;
-  for (std::size_t pair = 0; pair < model.active.size(); ++pair)
-    result.push_back(rows.normal(static_cast<Eigen::Index>(pair)));
-  return result;
-}
-
 /// The symmetric part of each pair's own block of W.
 std::vector<PairBlock> own_blocks(const MatrixXd& W, const ReducedModel& model)
 {
@@ -85,11 +76,13 @@ void prepare(ReducedMap& map, double period)
   map.W.resize(rows, rows);
   own_columns(map.W, map.sharing).noalias() = model.G * own_columns(map.from_reactions, map.sharing);
   gather_columns(map.W, map.sharing);
-  const std::vector<Eigen::Index> normal = normal_rows(model);
-  for (std::size_t i = 0; i < normal.size(); ++i) map.W(normal[i], normal[i]) += gap_law(map, i).by_reaction;
+  const PairRows<Eigen::Index> pairs(model.directions);
+  for (std::size_t i = 0; i < model.active.size(); ++i)
+  {
+    const Eigen::Index normal = pairs.normal(static_cast<Eigen::Index>(i));
+    map.W(normal, normal) += gap_law(map, i).by_reaction;
+  }
   map.G = model.G;
-  map.W_single = map.W.cast<float>();
-  map.W_n = map.W_single(normal, Eigen::all);
   map.own = own_blocks(map.W, model);
 }
 

@@ -25,22 +25,10 @@ using Eigen::MatrixXd;
 struct LinearStep
 {
   LinearContact contact;
-  MatrixXd rates;         // b
-  MatrixXd by_reactions;  // P Q
-  LeadingFactor factor{}; // once it is factored
+  MatrixXd rates;        // b
+  MatrixXd by_reactions; // P Q
+  LeadingFactor factor;
 };
-
-/// Gives every rank the factor that `root` has.
-void share_factor(LeadingFactor& factor, int root, MPI_Comm comm)
-{
-  if (ranks_of(comm) == 1) return;
-  Index size = factor.order.size();
-  MPI_Bcast(&size, sizeof size, MPI_BYTE, root, comm);
-  factor.LU.resize(size, size);
-  factor.order.resize(size);
-  MPI_Bcast(factor.LU.data(), to_int(factor.LU.size()), MPI_DOUBLE, root, comm);
-  MPI_Bcast(factor.order.data(), to_int(factor.order.size()), MPI_INT, root, comm);
-}
 
 /// db of all rows for changes of the start (v, q), without past sliding.
 MatrixXd free_rates(const ReducedMap& map)
@@ -68,13 +56,14 @@ LinearStep linear_step(const ReducedMap& map, const MatrixXd& rates, const StepR
   const Index n = model.size(), d = model.directions;
   const PairRows<Index> rows(model.directions);
   LinearContact contact(map.W, {model.directions, model.friction, map.theta}, record);
-  if (contact.is_open()) return {std::move(contact), {}, {}};
+  if (contact.is_open()) return {std::move(contact), {}, {}, {}};
   MatrixXd moved = rates;
   for (std::size_t i = 0; i < record.opposes_theta.size(); ++i)
     if (const Index first = rows.tangential(static_cast<Index>(i)); record.opposes_theta[i])
       moved.middleRows(first, d).leftCols(n) += (1 - map.theta) / map.theta * model.G.middleRows(first, d);
   MatrixXd of_rows = contact.rows_of(moved), by_reactions = contact.columns_of(map.from_reactions);
-  return {std::move(contact), std::move(of_rows), std::move(by_reactions)};
+  LeadingFactor factor = contact.factor();
+  return {std::move(contact), std::move(of_rows), std::move(by_reactions), std::move(factor)};
 }
 
 /// Columns of the start, rows (v, q), to those of the step's end.
@@ -111,7 +100,6 @@ MatrixXd halves_exchanged(const MatrixXd& X)
 }
 
 /// The columns (q, v) after a passage(step, X) of each contact, X with rows (v, q): this rank's share of the columns.
-/// Each rank factors its share of the steps.
 template <class Contacts, class Passage> MatrixXd
 through_period(ReducedMap& map, double period, const Contacts& contacts, const MatrixXd& columns, Passage passage)
 {
@@ -119,20 +107,7 @@ through_period(ReducedMap& map, double period, const Contacts& contacts, const M
   const MatrixXd rates = free_rates(map);
   const Share own = share_of(columns.cols(), map.comm);
   MatrixXd X = halves_exchanged(columns.middleCols(own.first, own.count));
-  const auto rank = static_cast<std::size_t>(rank_of(map.comm)), ranks = static_cast<std::size_t>(ranks_of(map.comm));
-  const auto step_at = [&](std::size_t i) { return linear_step(map, rates, contacts[static_cast<std::ptrdiff_t>(i)]); };
-  std::optional<LinearStep> factored;
-  for (std::size_t i = 0; i < contacts.size(); ++i)
-  {
-    if (i % ranks == 0 && i + rank < contacts.size())
-    {
-      factored.emplace(step_at(i + rank));
-      factored->factor = factored->contact.factor();
-    }
-    LinearStep step = i % ranks == rank ? std::move(*factored) : step_at(i);
-    share_factor(step.factor, static_cast<int>(i % ranks), map.comm);
-    passage(step, X);
-  }
+  for (const StepRecord& record : contacts) passage(linear_step(map, rates, record), X);
   MatrixXd result(columns.rows(), columns.cols());
   result.middleCols(own.first, own.count) = halves_exchanged(X);
   gather_columns(result, map.comm);

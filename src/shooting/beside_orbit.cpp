@@ -82,18 +82,54 @@ private:
   Eigen::Matrix2d products_ = Eigen::Matrix2d::Zero();
 };
 
+/// A motion beside an orbit, as parts of its fluctuation.
+struct BesideMotion
+{
+  double first = 0;               // where the motion begins
+  double lowest = 0, highest = 0; // where it has been seen long enough
+  long periods = 0;               // at most
+};
+
+/// Distances from the orbit at the ends of periods, without their part along the flow. Where the tangent holds they are
+/// multiplied by |m| in every period, of a complex multiplier m too.
+std::vector<double> distances_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
+                                     const FastestMotion& fastest, const BesideMotion& motion)
+{
+  const Owned<Vec> state = state_beside(problem, orbit, fastest.real, motion.first);
+  const Distance distance(problem.flow, orbit, fastest);
+  std::vector<double> distances;
+  for (long k = 0; k < motion.periods; ++k)
+  {
+    const Orbit now = evaluate(problem, log, state, orbit.period);
+    check(VecAXPY(state, 1, now.defect));
+    const Owned<Vec> away = copy_of(state.get());
+    check(VecAXPY(away, -1, orbit.state));
+    distances.push_back(distance(away) / orbit.fluctuation);
+    if (!(distances.back() < motion.highest) || distances.back() < motion.lowest) break;
+  }
+  return distances;
+}
+
 /// The first quarter is left out, where other motions decay, and what comes after the bounds: the shift in time that a
-/// motion ends with leaves the flow's direction by its square, and far away growth ends.
+/// motion ends with leaves the flow's direction by its square, and far away growth ends. A motion whose distance
+/// doubles before there is enough for a line has left.
 SeenGrowth growth_of(const BesideMotion& motion, std::vector<double> distances, double residual)
 {
+  const double last = std::isfinite(distances.back()) ? distances.back() : motion.highest,
+               periods = static_cast<double>(distances.size());
   if (!(distances.back() < motion.highest) || distances.back() < motion.lowest) distances.pop_back();
   std::vector<double> logarithms(distances.size());
   std::transform(distances.begin(), distances.end(), logarithms.begin(), [](double d) { return std::log(d); });
   SeenGrowth seen = fit_growth(logarithms);
+  if (seen.periods == 0)
+  {
+    const double growth = std::pow(last / motion.first, 1 / periods);
+    seen = {last >= 2 * motion.first ? static_cast<long>(periods) : 0, growth, std::abs(growth - 1) / 2};
+  }
   seen.part = motion.first;
   double left = 0;
   for (const double distance : distances) left += residual / distance;
-  seen.error += left / static_cast<double>(distances.size());
+  if (!distances.empty()) seen.error += left / static_cast<double>(distances.size());
   return seen;
 }
 
@@ -116,24 +152,6 @@ Owned<Vec> state_beside(const OrbitProblem& problem, const Orbit& orbit, Vec fas
   return state;
 }
 
-std::vector<double> distances_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
-                                     const FastestMotion& fastest, const BesideMotion& motion)
-{
-  const Owned<Vec> state = state_beside(problem, orbit, fastest.real, motion.first);
-  const Distance distance(problem.flow, orbit, fastest);
-  std::vector<double> distances;
-  for (long k = 0; k < motion.periods; ++k)
-  {
-    const Orbit now = evaluate(problem, log, state, orbit.period);
-    check(VecAXPY(state, 1, now.defect));
-    const Owned<Vec> away = copy_of(state.get());
-    check(VecAXPY(away, -1, orbit.state));
-    distances.push_back(distance(away) / orbit.fluctuation);
-    if (!(distances.back() < motion.highest) || distances.back() < motion.lowest) break;
-  }
-  return distances;
-}
-
 std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
                                        const FloquetAnalysis& floquet, long periods)
 {
@@ -149,7 +167,9 @@ std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceL
     // the change of a growth is proportional to the part at least, and 1 - smaller of it is between the two
     if (now.periods > 0 && !seen.empty())
       now.error += std::abs(now.growth - seen.back().growth) * smaller / (1 - smaller);
-    if (now.periods > 0) seen.push_back(now);
+    const bool unstable = floquet.multipliers.stability == Stability::unstable;
+    if (now.periods > 0 || unstable) seen.push_back(now);
+    if (unstable) break;
     if (now.periods > 0 && std::abs(now.growth - largest) <= now.error + bar) break;
     highest = part;
     part *= smaller;
@@ -170,7 +190,20 @@ void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipli
                                       nearest.growth);
     return;
   }
-  if (!is_left_open_by_largest(multipliers)) return;
+  if (multipliers.stability == Stability::unstable && !(nearest.growth - nearest.error > 1))
+  {
+    multipliers.stability = Stability::undecided;
+    multipliers.crossing = Crossing::none;
+    multipliers.would_decide =
+        format("small motions grow %.4g times a period by the tangent, but one that began %.2g %% beside the cycle "
+               "grows %.4g times: contact that only just opens, closes or sticks; other steps a period, or "
+               "-cycle_watched_periods",
+               std::abs(multipliers.values.front()), 100 * nearest.part, nearest.growth);
+    return;
+  }
+  if (multipliers.stability != Stability::undecided) return;
+  const bool grows = nearest.growth > 1;
+  if (!grows && !is_left_open_by_largest(multipliers)) return;
   const double of_grid = moved_by_grid(multipliers, multipliers.values.front());
   if (of_grid > std::abs(nearest.growth - 1))
     multipliers.would_decide = format(
@@ -179,7 +212,6 @@ void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipli
         "would decide",
         nearest.growth, of_grid);
   if (!(std::abs(nearest.growth - 1) > nearest.error + of_grid)) return;
-  const bool grows = nearest.growth > 1;
   multipliers.stability = grows ? Stability::unstable : Stability::stable;
   if (grows) multipliers.crossing = crossing_of(multipliers.values.front());
   multipliers.would_decide.clear();

@@ -9,29 +9,18 @@ namespace squeal
 /// less energy.
 Owned<Vec> state_beside(const OrbitProblem& problem, const Orbit& orbit, Vec fastest, double part);
 
-/// A motion beside an orbit, as parts of its fluctuation.
-struct BesideMotion
-{
-  double first = 0;               // where the motion begins
-  double lowest = 0, highest = 0; // where it has been seen long enough
-  long periods = 0;               // at most
-};
-
-/// Distances from the orbit at the ends of periods, without their part along the flow. Where the tangent holds they are
-/// multiplied by |m| in every period, of a complex multiplier m too.
-std::vector<double> distances_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
-                                     const FastestMotion& fastest, const BesideMotion& motion);
-
 /// What the distance of a motion from the orbit grows by, from smaller and smaller parts of the fluctuation until that
-/// is what the largest multiplier says. The largest part comes first.
+/// is what the largest multiplier says; of an unstable orbit from one part alone. The largest part comes first.
 std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
                                        const FloquetAnalysis& floquet, long periods);
 
 /// Whether the bar of the largest multiplier, or of its conjugate, alone leaves the verdict open. Not collective.
 bool is_left_open_by_largest(const Multipliers& multipliers);
 
-/// Decides what only the bar of the largest multiplier leaves undecided, where a motion along it was seen to grow or to
-/// decay beyond its own bar. "Stable" is undecided where one was seen to grow.
+/// Decides what is undecided where a motion was seen to grow beyond its own bar, and what only the bar of the largest
+/// multiplier leaves undecided where it was seen to decay. "Stable" is undecided where one was seen to grow, and
+/// "unstable" where it was not: where contact only just opens, closes or sticks, the tangent holds in a neighbourhood
+/// that no motion stays in.
 void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers);
 
 } // namespace squeal

@@ -51,7 +51,7 @@ struct Attempt
 
   bool converged() const { return found.ending == StageEnding::converged; }
   bool repels() const { return converged() && verdict.repels(); }
-  bool answers() const { return converged() && !verdict.repels() && verdict.beside != Beside::unclear; }
+  bool answers() const { return converged() && !verdict.repels() && !verdict.doubted; }
 };
 
 /// Whether shooting has found the orbit again. Each is known up to its residual, which slow motions multiply.
@@ -85,7 +85,7 @@ Attempt attempt_from(const Search& search, const Orbit& free, const Attempt* kno
   if (known && known->converged() && is_again(attempt.found.orbit, known->found.orbit))
   {
     attempt.verdict.floquet.multipliers = known->verdict.floquet.multipliers;
-    attempt.verdict.beside = known->verdict.beside;
+    attempt.verdict.doubted = known->verdict.doubted;
   }
   else
     attempt.verdict = judge(problem, options, log, attempt.found.orbit);

@@ -191,7 +191,7 @@ def data_sets_of(file):
     return found
 
 
-# Written with a verdict that is unstable or undecided, or by Arnoldi in place of a projection: no run here ends so.
+# Written with a verdict that is unstable or undecided, or by the whole matrix in place of a projection: no run here ends so.
 UNLESS_STABLE = {"cycle.multipliers.crossing", "cycle.multipliers.would_decide", "cycle.multipliers.refusal"}
 # Written of points of a sweep that fail.
 UNLESS_STABLE |= {"sweep.points[].reason"}

@@ -13,14 +13,10 @@ namespace squeal
 /// The active pairs at the end of a step, and what the next one starts from.
 struct ReducedContact
 {
-  Eigen::VectorXd r;                       // [N] a contact vector, as all vectors here
-  Eigen::VectorXd Wr{};                    // W r; empty: not known
-  Eigen::VectorXd w{};                     // [m/s] W r + b
-  Eigen::VectorXd r_before{}, Wr_before{}; // of the step before; empty: none
-  int since_read = 0;                      // steps since W was read in double precision
-  std::vector<double> past{};              // [m/s] w_t - s+, as sliding_direction.hpp says
-  /// W_nn + mu W_nt d, d the direction of each pair's friction when W was read: normal rates by normal reactions.
-  Eigen::MatrixXf normal_responses{};
+  Eigen::VectorXd r;          // [N] a contact vector, as all vectors here
+  Eigen::VectorXd w{};        // [m/s] W r + b
+  Eigen::VectorXd r_before{}; // of the step before; empty: none
+  std::vector<double> past{}; // [m/s] w_t - s+, as sliding_direction.hpp says
 };
 
 /// The period map of the reduced model by theta steps (src/README.md, section 4), with matrices for each step size:
@@ -37,7 +33,6 @@ struct ReducedMap
   Eigen::VectorXd from_load{};                        // h A^-1 f
   Eigen::MatrixXd from_reactions{};                   // h A^-1 H
   Eigen::MatrixXd W{};                                // G h A^-1 H
-  Eigen::MatrixXf W_single{}, W_n{};                  // the same for changes; its normal rows
   Eigen::Matrix<double, -1, -1, Eigen::RowMajor> G{}; // the model's, stored by rows
   std::vector<PairBlock> own{};                       // the symmetric part of each pair's own block of W
   Eigen::VectorXd reactions{};                        // [N] every period's warm start

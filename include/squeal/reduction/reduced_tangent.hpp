@@ -17,7 +17,7 @@ std::vector<StepRecord> recorded_contacts(const ReducedModel& model, int directi
                                           std::span<const StepRecord> records);
 
 /// Columns of changes of the start, (q, v), to those of the period's end: the product of the steps' own tangents on the
-/// recorded contact. Each rank does its share of the columns, and factors the contact of its share of the steps.
+/// recorded contact. Each rank does its share of the columns.
 Eigen::MatrixXd apply_tangent(ReducedMap& map, double period, std::span<const StepRecord> contacts,
                               const Eigen::MatrixXd& columns);
 

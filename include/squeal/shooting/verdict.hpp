@@ -7,22 +7,14 @@
 namespace squeal
 {
 
-/// The course of a motion that began beside an orbit.
-enum class Beside
-{
-  not_seen,
-  leaves,
-  unclear, // against the verdict "unstable" it does not leave, and hardly comes nearer
-};
-
 /// Whether motions settle on an orbit, and how that is known.
 struct Verdict
 {
   FloquetAnalysis floquet{};
-  Beside beside = Beside::not_seen;
+  bool doubted = false;   // the tangent says that it repels; a motion beside it neither leaves nor comes nearer
   bool cut_short = false; // the run was asked to end meanwhile
 
-  bool repels() const { return beside == Beside::leaves || floquet.multipliers.stability == Stability::unstable; }
+  bool repels() const { return floquet.multipliers.stability == Stability::unstable; }
 };
 
 /// Seeks the multipliers of an orbit, and holds them against motions beside it. Where the run is asked to end
