@@ -332,7 +332,7 @@ SlowMotions ReducedFamily::slow_motions(double period, Vec start)
   const auto moved = record_contacts(map, period, moved_on(map, period / map.steps / 2, state));
   other_grid_.reset();
   recorded_ = record_contacts(map, period, state);
-  const ReducedSpectrum spectrum = large_multipliers(map, period, recorded_, deciding_values);
+  const ReducedSpectrum spectrum = large_multipliers(map, period, recorded_);
   SlowMotions slow = slow_motions_of(spectrum, own_, own_coordinates(), start);
   slow.periods = 2;
   add_changes(multipliers_along(spectrum, map, period, moved), 1, slow);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
 
 namespace squeal
 {
@@ -41,7 +42,7 @@ LimitCycle measured_on_full_model(const CycleCorrection& correction, const Shoot
   options.shooting.finish = Finish::none;
   options.shooting.max_periods = 1; // nor a motion beside it, which would not begin beside a cycle of the full model
   LimitCycle cycle =
-      find_cycle_from(with_settings(correction.problem, settings), options, start, correction.preconditioner, 0);
+      find_cycle_from(with_settings(correction.problem, settings), options, start, &correction.preconditioner, 0);
   cycle.tolerance = 0;
   return cycle;
 }
@@ -73,9 +74,9 @@ FittedCycle correct_on_full_model(const ReducedSearch& search, const ReducedCycl
   if (asked)
     cycle = measured_on_full_model(correction, start);
   else if (problem.resumed)
-    cycle = find_cycle_from_resumed(problem, search.options, preconditioner);
+    cycle = find_cycle_from_resumed(problem, search.options, &preconditioner);
   else
-    cycle = find_cycle_from(problem, search.options, start, preconditioner, 0);
+    cycle = find_cycle_from(problem, search.options, start, &preconditioner, 0);
   found.fidelity.full_periods = cycle.convergence.periods;
   if (cycle.cut_short) return found;
   const OutcomeKind kind = cycle.outcome.kind;
@@ -209,10 +210,16 @@ FittedCycle find_on_full_model(const CycleProblem& given, const FidelityRequest&
     found.fidelity.used = CycleModel::full;
     found.cycle.convergence.periods += fidelity.full_periods; // of a search that stalled
     found.fidelity.full_periods = found.cycle.convergence.periods;
-    if (steps == StepChoice::by_accuracy && !found.cycle.cut_short)
+    if (steps == StepChoice::by_accuracy && !found.cycle.cut_short &&
+        found.cycle.outcome.kind == OutcomeKind::converged)
     {
-      const Preconditioner preconditioner = estimated_preconditioner(problem, options.band_factor);
-      found = refine_steps({problem, options, preconditioner}, std::move(found));
+      PeriodMap map{problem.sliding, problem.step, found.cycle.steps_per_period, found.cycle.theta};
+      map.reactions = problem.sliding.equilibrium.reactions;
+      std::shared_ptr<const ReducedModel> kept;
+      CycleProblem with_model = problem;
+      const Preconditioner preconditioner = recorded_preconditioner(with_model, map, kept);
+      record_period(map, found.cycle.orbit.period, found.cycle.orbit.state, {});
+      found = refine_steps({with_model, options, preconditioner}, std::move(found));
     }
     found.fidelity.full_seconds += MPI_Wtime() - clock;
     return found;

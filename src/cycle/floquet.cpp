@@ -160,17 +160,17 @@ std::string lack_of_memory(const Structure& structure, Index shapes)
                 static_cast<long>(shapes), 1e-9 * needed, 1e-9 * free);
 }
 
-/// The reduced model for the recorded periods, that of the start where it holds them; null where none fits the free
-/// memory, with the reason.
-std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const RecordedPeriods& periods,
-                                              std::string& missing)
+} // namespace
+
+std::shared_ptr<const ReducedModel>
+recorded_model(const CycleProblem& problem, std::span<const std::vector<StepRecord>> periods, std::string& missing)
 {
   const Interface& interface = problem.sliding.interface;
-  const std::vector<PairHistory> pairs = histories(interface, periods.records);
+  const std::vector<PairHistory> pairs = histories(interface, periods);
   if (problem.reduced && holds(*problem.reduced, pairs, interface))
     return {std::shared_ptr<const ReducedModel>(), problem.reduced}; // borrowed
   std::size_t steps = 0;
-  for (const auto& records : periods.records) steps += records.size();
+  for (const auto& records : periods) steps += records.size();
   const PairRoles roles = roles_of(pairs, interface, steps);
   const bool slide = std::ranges::none_of(roles.active,
                                           [&](int pair)
@@ -194,6 +194,9 @@ std::shared_ptr<const ReducedModel> model_for(const CycleProblem& problem, const
   return model;
 }
 
+namespace
+{
+
 /// Sets the errors of the spectrum's moduli by the grid of time: what one moved by half a step changes, and one of
 /// other steps.
 void set_grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, const OtherSteps& other, double period,
@@ -212,7 +215,7 @@ SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, cons
   const RecordedPeriods periods = record_periods(map, other.steps, period, start);
   SlowMotions none;
   none.periods = other.steps > 0 ? 3 : 2;
-  const auto model = model_for(problem, periods, none.missing);
+  const auto model = recorded_model(problem, periods.records, none.missing);
   if (!model) return none;
   const auto contacts = [&](int which)
   {
@@ -221,7 +224,7 @@ SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, cons
   };
   ReducedMap own{*model, map.steps, map.theta, comm};
   const auto recorded = contacts(RecordedPeriods::own);
-  const ReducedSpectrum spectrum = large_multipliers(own, period, recorded, deciding_values);
+  const ReducedSpectrum spectrum = large_multipliers(own, period, recorded);
   // no motion beside a cycle that shooting finds doubles in a period: shapes that do not fit friction do
   if (!spectrum.values.empty() && std::abs(spectrum.values.front()) > 2)
   {

@@ -3,6 +3,8 @@
 /// oblique projection needs come from a reduced model on the contact of one recorded period of the full one.
 #include "squeal/cycle/limit_cycle.hpp"
 
+#include <memory>
+
 namespace squeal
 {
 
@@ -13,6 +15,11 @@ struct OtherSteps
   int steps = 0; // 0: none is made
   double part = 0;
 };
+
+/// The reduced model for recorded periods, the problem's own where it holds them; null where none fits the free memory,
+/// with the reason. Error: as of reduce.
+std::shared_ptr<const ReducedModel>
+recorded_model(const CycleProblem& problem, std::span<const std::vector<StepRecord>> periods, std::string& missing);
 
 /// Gives the flow the slow motions of the map. Errors hold what these other steps change. Borrows problem and map.
 void add_slow_motions(const CycleProblem& problem, PeriodMap& map, const OtherSteps& other, Flow& flow);

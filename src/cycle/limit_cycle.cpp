@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 
 namespace squeal
@@ -45,17 +46,21 @@ void add_remedies(const PeriodMap& map, Outcome& outcome)
 } // namespace
 
 LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
-                           const Preconditioner& preconditioner, int free_periods)
+                           const Preconditioner* preconditioner, int free_periods)
 {
   const CycleSettings& settings = problem.settings;
   PeriodMap map{problem.sliding, problem.step, settings.steps_per_period, settings.theta};
   map.reactions = problem.sliding.equilibrium.reactions;
   map.keeps_step = is_dear(map.steps * work_of_step(problem.sliding.structure));
   Flow flow = flow_of(map);
-  add_slow_motions(problem, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
+  std::shared_ptr<const ReducedModel> recorded;
+  CycleProblem with_model = problem;
+  const Preconditioner by_record = recorded_preconditioner(with_model, map, recorded),
+                       &inverse = preconditioner ? *preconditioner : by_record;
+  add_slow_motions(with_model, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
   CycleKeeper keeper(problem.sliding.structure);
   keeper.watch(flow);
-  ShootingResult found = shoot(flow, preconditioner, start, {settings.tolerance, free_periods}, options.shooting);
+  ShootingResult found = shoot(flow, inverse, start, {settings.tolerance, free_periods}, options.shooting);
   LimitCycle cycle{std::move(found.outcome),
                    settings.steps_per_period,
                    settings.tolerance,
@@ -77,7 +82,7 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   {
     Progress progress(comm_of(start.u), "cycle, offsets", 1);
     ConvergenceLog log{progress};
-    const OrbitProblem found_again = problem_of(flow, preconditioner, start, settings.tolerance);
+    const OrbitProblem found_again = problem_of(flow, inverse, start, settings.tolerance);
     cycle.spreads = spread_over_offsets({map, found_again, options.shooting, log, cycle.orbit, cycle.measured});
   }
   cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};
@@ -124,7 +129,7 @@ double equivalent_amplitude(const CycleProblem& problem, const State& state)
 }
 
 LimitCycle find_cycle_from_resumed(const CycleProblem& problem, const CycleOptions& options,
-                                   const Preconditioner& preconditioner)
+                                   const Preconditioner* preconditioner)
 {
   const ResumedOrbit& orbit = *problem.resumed;
   ShootingStart start{problem.sliding.equilibrium.u, orbit.state.u, orbit.state.v, orbit.period};
@@ -134,8 +139,7 @@ LimitCycle find_cycle_from_resumed(const CycleProblem& problem, const CycleOptio
 
 LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions& options)
 {
-  if (problem.resumed)
-    return find_cycle_from_resumed(problem, options, estimated_preconditioner(problem, options.band_factor));
+  if (problem.resumed) return find_cycle_from_resumed(problem, options, nullptr);
   const ComplexMode& mode = problem.unstable.modes.front();
   const Estimate& estimate = problem.unstable.estimates.front();
   const Equilibrium& equilibrium = problem.sliding.equilibrium;
@@ -160,8 +164,7 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
                       is_cycle,
                       problem.given_rounds};
   start.other_unstable = problem.unstable.modes.size() - 1;
-  return find_cycle_from(problem, options, start, estimated_preconditioner(problem, options.band_factor),
-                         is_cycle ? 0 : problem.settings.free_periods);
+  return find_cycle_from(problem, options, start, nullptr, is_cycle ? 0 : problem.settings.free_periods);
 }
 
 } // namespace squeal

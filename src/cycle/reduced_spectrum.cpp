@@ -18,6 +18,13 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
+/// Which multipliers are wanted.
+struct LargeValues
+{
+  double above = 0; // in modulus
+  int at_least = 0, at_most = 0;
+};
+
 /// How many of the values are wanted, complex pairs whole.
 std::size_t number_of(const std::vector<Complex>& values, const LargeValues& wanted)
 {
@@ -97,9 +104,9 @@ MatrixXd energy_representatives(const ReducedModel& model, const MatrixXd& left)
 
 } // namespace
 
-ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const StepRecord> contacts,
-                                  const LargeValues& wanted)
+ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const StepRecord> contacts)
 {
+  constexpr LargeValues wanted{0.85, 4, 24};
   const Index size = map.model.size(), slow = map.model.slow;
   const MatrixXd columns = monodromy(map, period, contacts);
   constexpr LargeValues known{0.5, 0, std::numeric_limits<int>::max()};
@@ -142,13 +149,11 @@ SlowMotions slow_motions_of(const ReducedSpectrum& spectrum, const ReducedModel&
 {
   SlowMotions slow;
   slow.values = spectrum.values;
-  slow.values.resize(number_of(spectrum.values, projected_values));
   slow.next = slow.values.size() < spectrum.known.size() ? std::abs(spectrum.known[slow.values.size()]) : 0;
   slow.errors.assign(slow.values.size(), 0);
   slow.rises = slow.errors;
-  const auto count = static_cast<Index>(slow.values.size());
-  slow.right = motions_of(coordinates, spectrum.right.leftCols(count), pattern);
-  slow.left = motions_of(coordinates, energy_representatives(model, spectrum.left.leftCols(count)), pattern);
+  slow.right = motions_of(coordinates, spectrum.right, pattern);
+  slow.left = motions_of(coordinates, energy_representatives(model, spectrum.left), pattern);
   slow.correct = [coordinates, columns = spectrum.columns](Complex m, Vec real, Vec imaginary)
   { apply_resolvent(columns, coordinates, m, real, imaginary); };
   return slow;

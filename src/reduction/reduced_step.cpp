@@ -2,7 +2,6 @@
 #include "squeal/reduction/reduced_step.hpp"
 #include "reduced_contact.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
-#include "squeal/algebra/panel.hpp"
 #include "squeal/contact/sliding_direction.hpp"
 
 namespace squeal
@@ -13,9 +12,6 @@ using Eigen::VectorXd;
 
 namespace
 {
-
-// Numbers that a step reads, 1 MB in 50 us. Its three messages take some microseconds each on a node.
-constexpr double least_to_share = 1e6 / sizeof(double);
 
 /// The symmetric part of each pair's own block of W.
 std::vector<PairBlock> own_blocks(const MatrixXd& W, const ReducedModel& model)
@@ -62,27 +58,25 @@ void prepare(ReducedMap& map, double period)
   const ReducedModel& model = map.model;
   const double theta = map.theta;
   const Eigen::Index n = model.size(), rows = model.G.rows();
-  map.sharing = 2. * static_cast<double>(n * (n + rows)) < least_to_share ? MPI_COMM_SELF : map.comm;
   MatrixXd right(n, 2 * n + rows + 1);
   right << model.M - h * (1 - theta) * model.C - h * h * theta * (1 - theta) * model.K, -h * model.K, h * model.H,
       h * model.force;
-  solve_dense_in_place(model.M + h * theta * model.C + h * h * theta * theta * model.K, own_columns(right, map.sharing),
+  solve_dense_in_place(model.M + h * theta * model.C + h * h * theta * theta * model.K, own_columns(right, map.comm),
                        "reduced model: a motion has neither mass nor stiffness");
-  gather_columns(right, map.sharing);
+  gather_columns(right, map.comm);
   map.h = h;
   map.from_state = right.leftCols(2 * n);
   map.from_reactions = right.middleCols(2 * n, rows);
   map.from_load = right.col(2 * n + rows);
   map.W.resize(rows, rows);
-  own_columns(map.W, map.sharing).noalias() = model.G * own_columns(map.from_reactions, map.sharing);
-  gather_columns(map.W, map.sharing);
+  own_columns(map.W, map.comm).noalias() = model.G * own_columns(map.from_reactions, map.comm);
+  gather_columns(map.W, map.comm);
   const PairRows<Eigen::Index> pairs(model.directions);
   for (std::size_t i = 0; i < model.active.size(); ++i)
   {
     const Eigen::Index normal = pairs.normal(static_cast<Eigen::Index>(i));
     map.W(normal, normal) += gap_law(map, i).by_reaction;
   }
-  map.G = model.G;
   map.own = own_blocks(map.W, model);
 }
 
@@ -95,18 +89,11 @@ struct PairMotion
   VectorXd free, before, position; // G v_free, G v, G q
 };
 
-/// By one reading of G, whose rows are shared.
-PairMotion motion_of_pairs(const ReducedMap& map, const ReducedState& state, const VectorXd& v_free)
+PairMotion motion_of_pairs(const ReducedModel& model, const ReducedState& state, const VectorXd& v_free)
 {
-  constexpr int lanes = 4; // one of them idle
-  using Rows = Eigen::Matrix<double, Eigen::Dynamic, lanes, Eigen::RowMajor>;
-  const Eigen::Index n = map.model.size();
-  Rows x(n, lanes), y(map.G.rows(), lanes);
-  x << v_free, state.v, state.q, VectorXd::Zero(n);
-  const Share own = share_of(y.rows(), map.sharing);
-  dense_product(map.G.data() + own.first * n, static_cast<std::size_t>(own.count), static_cast<std::size_t>(n), lanes,
-                x.data(), y.data() + own.first * lanes);
-  gather_shares(y.data(), y.rows(), lanes, map.sharing);
+  MatrixXd x(model.size(), 3);
+  x << v_free, state.v, state.q;
+  const MatrixXd y = model.G * x;
   return {y.col(0), y.col(1), y.col(2)};
 }
 
@@ -143,7 +130,7 @@ VectorXd contact_velocity(const ReducedModel& model, VectorXd velocity)
 bool find_reactions(const ReducedMap& map, const ReducedState& state, const VectorXd& v_free, ReducedContact& contact)
 {
   const ReducedModel& model = map.model;
-  const PairMotion motion = motion_of_pairs(map, state, v_free);
+  const PairMotion motion = motion_of_pairs(model, state, v_free);
   const VectorXd free = free_contact_velocity(map, motion);
   const VectorXd& velocity = motion.before;
   const auto reactions = [&] { return PairView<const double>(contact.r, model.directions); };
@@ -168,15 +155,11 @@ bool find_reactions(const ReducedMap& map, const ReducedState& state, const Vect
 bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact)
 {
   const Eigen::Index n = map.model.size();
-  const Share own = share_of(n, map.sharing);
-  VectorXd both(2 * n), next(n);
+  VectorXd both(2 * n);
   both << state.v, state.q;
-  auto rows = next.segment(own.first, own.count);
-  rows = map.from_state.middleRows(own.first, own.count) * both + map.from_load.segment(own.first, own.count);
-  gather_shares(next.data(), n, 1, map.sharing);
+  VectorXd next = map.from_state * both + map.from_load;
   const bool converged = find_reactions(map, state, next, contact);
-  rows.noalias() += map.from_reactions.middleRows(own.first, own.count) * contact.r;
-  gather_shares(next.data(), n, 1, map.sharing);
+  next.noalias() += map.from_reactions * contact.r;
   state.q += map.h * (map.theta * next + (1 - map.theta) * state.v);
   state.v = std::move(next);
   return converged;

@@ -149,10 +149,6 @@ std::vector<StepRecord> record_contacts(ReducedMap& map, double period, ReducedS
     record.contact_velocity.assign(contact.w.begin(), contact.w.end());
     for (std::size_t pair = 0; pair < map.model.active.size(); ++pair)
       record.opposes_theta.push_back(!opposes_end(PairView<const double>(contact.past, map.model.directions), pair));
-    // ranks that see other pairs closed would factor other matrices
-    MPI_Bcast(record.reactions.data(), to_int(record.reactions.size()), MPI_DOUBLE, 0, map.comm);
-    MPI_Bcast(record.contact_velocity.data(), to_int(record.contact_velocity.size()), MPI_DOUBLE, 0, map.comm);
-    MPI_Bcast(record.opposes_theta.data(), to_int(record.opposes_theta.size()), MPI_CHAR, 0, map.comm);
   }
   return records;
 }

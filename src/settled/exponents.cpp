@@ -1,5 +1,7 @@
 #include "squeal/settled/exponents.hpp"
 
+#include "squeal/algebra/multivector.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -9,18 +11,6 @@ namespace squeal
 
 namespace
 {
-
-/// Entries that depend on their place and the column alone.
-void fill(Vec part, PetscInt column, double shift)
-{
-  PetscInt first = 0, last = 0;
-  double* entries = nullptr;
-  check(VecGetOwnershipRange(part, &first, &last));
-  check(VecGetArray(part, &entries));
-  for (PetscInt i = first; i < last; ++i)
-    entries[i - first] = std::sin(shift + (1.7 + 0.61 * static_cast<double>(column)) * static_cast<double>(i + 1));
-  check(VecRestoreArray(part, &entries));
-}
 
 /// Gram-Schmidt. Returns the length of each column before it was scaled, beside those before it.
 std::vector<double> orthonormalise(const Flow& flow, std::vector<Owned<Vec>>& columns)
@@ -42,11 +32,12 @@ std::vector<double> orthonormalise(const Flow& flow, std::vector<Owned<Vec>>& co
 TangentBundle make_bundle(const Flow& flow, Vec like, PetscInt count)
 {
   TangentBundle bundle;
+  const MultiVector random = random_multivector(flow.M, 2 * count);
   for (PetscInt k = 0; k < count; ++k)
   {
     Owned<Vec> column = zeros_like(like);
-    fill(displacement(column), k, 0.3);
-    fill(velocity(column), k, 2.1);
+    copy_column(random, 2 * k, displacement(column));
+    copy_column(random, 2 * k + 1, velocity(column));
     // both parts weigh about the same, each column's in a ratio of its own: one degree of freedom has two columns
     const Owned<Vec> image = zeros_like(like);
     energy_image(flow, column, image);

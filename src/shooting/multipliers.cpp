@@ -1,6 +1,6 @@
 #include "squeal/shooting/multipliers.hpp"
 
-#include "monodromy.hpp"
+#include "oblique_projector.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/cost.hpp"
 #include "squeal/base/progress.hpp"
@@ -20,19 +20,15 @@ using Eigen::Index;
 
 /// The multipliers of these places along eight periods on a grid of 8 N + 1 steps, by projection on the vectors of all
 /// of them; then what each is a period: the root that is nearest to the value.
-std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const Eigen::MatrixXd& Q,
+std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const WholeSpace& space,
                                          const std::vector<DenseEigenpair>& pairs, const std::vector<Index>& places)
 {
   constexpr int periods = 8;
   const Orbit& orbit = monodromy.orbit;
-  const Eigen::MatrixXd V = real_columns(pairs, Q.cols());
-  Eigen::MatrixXd image(Q.cols(), static_cast<Index>(places.size()));
-  std::vector<Owned<Vec>> states;
-  for (const Index place : places) states.push_back(state_at(Q * V.col(place), orbit));
+  const Eigen::MatrixXd V = real_columns(pairs, space.right.columns());
   monodromy.flow.record_period(periods * orbit.period, orbit.state, {0, periods, 1});
-  multiply(monodromy, states);
-  for (Index k = 0; k < image.cols(); ++k)
-    image.col(k) = Q.transpose() * coordinates_of(states[static_cast<std::size_t>(k)], orbit.period);
+  const Eigen::MatrixXd image =
+      inner_products(space.left, image_of(monodromy, combination(space.right, V(Eigen::all, places))));
   // vectors of motions that contact takes away may be parallel: they have no part in the others' rows
   const Eigen::MatrixXd projected = V.completeOrthogonalDecomposition().solve(image)(places, Eigen::all);
   if (!projected.allFinite()) return {};
@@ -59,22 +55,21 @@ std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const Eigen
 /// by what the grid allows, and a grid with a whole number of steps a period places each impact at one point of its
 /// step. So the bars hold as well what changes along eight periods in 8 N + 1 steps, which place it at eight points.
 /// Bars of real multipliers hold by how much that of the shift in time misses 1 on either grid.
-FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
+FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
 {
   FloquetAnalysis result;
   Multipliers& multipliers = result.multipliers;
   multipliers.method = MultiplierMethod::whole;
   const Orbit& orbit = monodromy.orbit;
-  const Eigen::MatrixXd Q = coordinates_with_mass(monodromy.flow);
+  const WholeSpace space = whole_space(monodromy.flow, orbit.period);
   bool finite = true;
   const auto pairs_on = [&](const TimeGrid& grid)
   {
     monodromy.flow.record_period(orbit.period, orbit.state, grid);
-    multipliers.periods += 2 * dofs;
-    const Eigen::MatrixXd whole =
-        whole_matrix(orbit, [&](std::span<const Owned<Vec>> states) { multiply(monodromy, states); });
+    multipliers.periods += space.right.columns();
+    const Eigen::MatrixXd whole = inner_products(space.left, image_of(monodromy, space.right));
     finite = finite && whole.allFinite();
-    return finite ? solve_dense_unsymmetric(Q.transpose() * whole * Q) : std::vector<DenseEigenpair>();
+    return finite ? solve_dense_unsymmetric(whole) : std::vector<DenseEigenpair>();
   };
   std::vector<DenseEigenpair> pairs = pairs_on({});
   std::vector<std::vector<DenseEigenpair>> on_others; // the other grids
@@ -91,7 +86,8 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   GridErrors grid(values.size());
   for (std::size_t k = 0; k < on_others.size(); ++k)
     add_changes(values, values_of(on_others[k]), other_grids[k].part, grid);
-  const std::size_t shift = find_shift(pairs, Q.transpose() * coordinates_of(orbit.rate, orbit.period));
+  const Owned<Vec> rate = copy_of(orbit.rate.get());
+  const std::size_t shift = find_shift(pairs, inner_products(space.left, block_of(std::span(&rate, 1))).col(0));
   multipliers.trivial_error = std::abs(values[shift] - 1.);
   // over eight periods the orbit's own error must not lead away from it
   const bool stays = std::pow(std::max(1., std::abs(values.front())), 8) * orbit.residual < 1e-2;
@@ -101,7 +97,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
     std::vector<Index> places;
     for (std::size_t i = 0; i < values.size(); ++i)
       if (std::abs(values[i]) > decays || i == shift) places.push_back(static_cast<Index>(i));
-    const std::vector<Complex> others = along_eight_periods(monodromy, Q, pairs, places);
+    const std::vector<Complex> others = along_eight_periods(monodromy, space, pairs, places);
     multipliers.periods += static_cast<long>(8 * places.size());
     monodromy.flow.record_period(orbit.period, orbit.state, {});
     if (others.empty()) return of_tangent_that_is_not_finite();
@@ -126,8 +122,9 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy, PetscInt dofs)
   pairs.erase(pairs.begin() + static_cast<std::ptrdiff_t>(shift));
   if (pairs.empty()) return result;
   decide(multipliers, {true, ""});
-  result.fastest =
-      fastest_motion(monodromy.flow, pairs.front(), [&](const Eigen::VectorXd& y) { return state_at(Q * y, orbit); });
+  const auto combined = [&](const Eigen::VectorXd& y)
+  { return std::move(states_of(combination(space.right, y), orbit.state).front()); };
+  result.fastest = fastest_motion(monodromy.flow, pairs.front(), combined);
   return result;
 }
 
@@ -190,13 +187,13 @@ FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOpti
       progress->update(done, format("%.0f products with the period's tangent", done));
     };
   }
-  if (chosen_method(options, dofs) == MultiplierMethod::whole) return from_whole_matrix(monodromy, dofs);
+  if (chosen_method(options, dofs) == MultiplierMethod::whole) return from_whole_matrix(monodromy);
   FloquetAnalysis result = multipliers_by_projection(monodromy, options.multipliers);
   if (options.multiplier_method != MultiplierMethod::automatic || !whole_is_affordable(problem.flow, dofs) ||
       result.multipliers.stability != Stability::undecided)
     return result;
   const Multipliers projected = std::move(result.multipliers);
-  result = from_whole_matrix(monodromy, dofs);
+  result = from_whole_matrix(monodromy);
   result.multipliers.periods += projected.periods;
   result.multipliers.refusal = projected.would_decide;
   return result;

@@ -77,10 +77,10 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
 
 /// The cycle from the resumed orbit.
 LimitCycle find_cycle_from_resumed(const CycleProblem& problem, const CycleOptions& options,
-                                   const Preconditioner& preconditioner);
+                                   const Preconditioner* preconditioner);
 
-/// The cycle from any start, after a number of free periods.
+/// The cycle from any start, after a number of free periods. `preconditioner`: null: that of the last of these.
 LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
-                           const Preconditioner& preconditioner, int free_periods);
+                           const Preconditioner* preconditioner, int free_periods);
 
 } // namespace squeal

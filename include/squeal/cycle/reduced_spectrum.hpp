@@ -17,25 +17,11 @@ struct ReducedSpectrum
   Eigen::MatrixXd known_right, known_left;  // bases of their vectors' spans; left ones along the slow coordinates
 };
 
-/// Which multipliers are wanted.
-struct LargeValues
-{
-  double above = 0; // in modulus
-  int at_least = 0, at_most = 0;
-};
+/// Those above 0.85 whose vectors the full model is projected on, 4 at least and 24 at most: each costs a product with
+/// its tangent, and a search bounds the rest. Collective among the map's ranks.
+ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const StepRecord> contacts);
 
-/// Those that a verdict is about.
-inline constexpr LargeValues deciding_values{0.85, 4, 48};
-
-/// Multipliers whose vectors the full model is projected on: each costs a product with its tangent. A search bounds the
-/// rest.
-inline constexpr LargeValues projected_values{0.85, 4, 24};
-
-/// Collective among the map's ranks.
-ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const StepRecord> contacts,
-                                  const LargeValues& wanted);
-
-/// The projected values of the spectrum, their vectors and the resolvent for motions that have these coordinates in the
+/// The values of the spectrum, their vectors and the resolvent for motions that have these coordinates in the
 /// model.
 SlowMotions slow_motions_of(const ReducedSpectrum& spectrum, const ReducedModel& model,
                             const ReducedCoordinates& coordinates, Vec pattern);

@@ -1,7 +1,7 @@
 #pragma once
 /// The modified theta-method on the reduced model (src/README.md, section 7.4), in few dense products. The ranks of a
-/// map follow one motion together, from rank 0's start: each has its share of the products, where these are large, and
-/// all solve contact. Functions that take a map that may change, and advance(), are collective among them.
+/// map follow one motion together, from rank 0's start, and share what a new step size needs. Functions that take a map
+/// that may change are collective among them.
 #include "squeal/contact/solver.hpp"
 #include "squeal/reduction/reduced_model.hpp"
 
@@ -26,16 +26,14 @@ struct ReducedMap
   const ReducedModel& model;
   int steps = 0;
   double theta = 0.5;
-  MPI_Comm comm = MPI_COMM_SELF;                      // of the ranks that follow the motion
-  MPI_Comm sharing = MPI_COMM_SELF;                   // those that share its products: all of them, or this one alone
-  double h = 0;                                       // [s] of the matrices below
-  Eigen::MatrixXd from_state{};                       // v_free = from_state (v, q) + from_load
-  Eigen::VectorXd from_load{};                        // h A^-1 f
-  Eigen::MatrixXd from_reactions{};                   // h A^-1 H
-  Eigen::MatrixXd W{};                                // G h A^-1 H
-  Eigen::Matrix<double, -1, -1, Eigen::RowMajor> G{}; // the model's, stored by rows
-  std::vector<PairBlock> own{};                       // the symmetric part of each pair's own block of W
-  Eigen::VectorXd reactions{};                        // [N] every period's warm start
+  MPI_Comm comm = MPI_COMM_SELF;    // of the ranks that follow the motion
+  double h = 0;                     // [s] of the matrices below
+  Eigen::MatrixXd from_state{};     // v_free = from_state (v, q) + from_load
+  Eigen::VectorXd from_load{};      // h A^-1 f
+  Eigen::MatrixXd from_reactions{}; // h A^-1 H
+  Eigen::MatrixXd W{};              // G h A^-1 H
+  std::vector<PairBlock> own{};     // the symmetric part of each pair's own block of W
+  Eigen::VectorXd reactions{};      // [N] every period's warm start
   ContactSettings contact{};
   long unconverged = 0;
 };
