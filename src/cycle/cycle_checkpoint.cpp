@@ -4,6 +4,7 @@
 #include "squeal/base/run_control.hpp"
 #include "squeal/equilibrium/file_order.hpp"
 
+#include <memory>
 #include <utility>
 
 namespace squeal
@@ -54,9 +55,19 @@ void keep_cycle(const Structure& structure, Vec start, double period)
        });
 }
 
-void CycleKeeper::watch(Flow& flow)
+void keep_cycles_of(Flow& flow, const Structure& structure)
 {
-  flow.integrate = [this, integrate = std::move(flow.integrate)](double period, Vec start, Vec end, Vec rate)
+  struct Near // the last orbit near a cycle
+  {
+    Owned<Vec> start; // null: none was met
+    double period = 0;
+  };
+  const auto near = std::make_shared<Near>();
+  const auto keep = [near, &structure]
+  {
+    if (near->start.get()) keep_cycle(structure, near->start, near->period);
+  };
+  flow.integrate = [near, keep, integrate = std::move(flow.integrate)](double period, Vec start, Vec end, Vec rate)
   {
     try
     {
@@ -67,32 +78,15 @@ void CycleKeeper::watch(Flow& flow)
       keep();
       throw;
     }
-    if (rate) note(period, start, end);
-    keep_if_due();
+    if (rate && is_near(start, end)) *near = {copy_of(start), period};
+    if (checkpoint_is_due()) keep();
   };
   if (!flow.apply_tangent) return;
-  flow.apply_tangent = [this, apply = std::move(flow.apply_tangent)](std::span<const Vec> states)
+  flow.apply_tangent = [keep, apply = std::move(flow.apply_tangent)](std::span<const Vec> states)
   {
     apply(states);
-    keep_if_due();
+    if (checkpoint_is_due()) keep();
   };
-}
-
-void CycleKeeper::note(double period, Vec start, Vec end)
-{
-  if (!is_near(start, end)) return;
-  start_ = copy_of(start);
-  period_ = period;
-}
-
-void CycleKeeper::keep_if_due()
-{
-  if (checkpoint_is_due()) keep();
-}
-
-void CycleKeeper::keep() const
-{
-  if (start_.get()) keep_cycle(structure_, start_, period_);
 }
 
 } // namespace squeal

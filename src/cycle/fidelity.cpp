@@ -59,7 +59,7 @@ void note_model_errors(const CycleCorrection& correction, FittedCycle& found)
 /// the accuracy needs. It does not answer where that shooting left the reduced cycle.
 FittedCycle correct_on_full_model(const ReducedSearch& search, const ReducedCycle& reduced, StepChoice steps)
 {
-  CycleProblem problem = with_settings(search.problem, search.problem.settings);
+  CycleProblem problem = search.problem;
   problem.reduced = &search.model;
   const Preconditioner preconditioner =
       preconditioner_of(search.correction, coordinates_in(search.model, problem.sliding.structure));

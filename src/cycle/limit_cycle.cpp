@@ -1,7 +1,6 @@
 #include "squeal/cycle/limit_cycle.hpp"
 
 #include "floquet.hpp"
-#include "offset_spread.hpp"
 #include "preconditioner.hpp"
 
 #include "squeal/base/cost.hpp"
@@ -58,8 +57,7 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   const Preconditioner by_record = recorded_preconditioner(with_model, map, recorded),
                        &inverse = preconditioner ? *preconditioner : by_record;
   add_slow_motions(with_model, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
-  CycleKeeper keeper(problem.sliding.structure);
-  keeper.watch(flow);
+  keep_cycles_of(flow, problem.sliding.structure);
   ShootingResult found = shoot(flow, inverse, start, {settings.tolerance, free_periods}, options.shooting);
   LimitCycle cycle{std::move(found.outcome),
                    settings.steps_per_period,
@@ -77,24 +75,15 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   cycle.measured =
       measure_period(map, {problem.probes, options.samples}, cycle.orbit.period, cycle.orbit.state, nullptr);
   ++cycle.convergence.periods;
-  if (cycle.outcome.kind == OutcomeKind::converged && cycle.orbit.offsets.held > 0 &&
-      whole_tangent_is_cheap(2. * dofs_of(cycle.orbit.state)))
-  {
-    Progress progress(comm_of(start.u), "cycle, offsets", 1);
-    ConvergenceLog log{progress};
-    const OrbitProblem found_again = problem_of(flow, inverse, start, settings.tolerance);
-    cycle.spreads = spread_over_offsets({map, found_again, options.shooting, log, cycle.orbit, cycle.measured});
-  }
   cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};
   add_remedies(map, cycle.outcome);
   return cycle;
 }
 
-CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings)
+CycleProblem with_settings(CycleProblem problem, const CycleSettings& settings)
 {
-  return {problem.sliding,      problem.linearised,    problem.modes,  problem.unstable, settings,
-          problem.step,         problem.modes_options, problem.probes, problem.given,    problem.given_period,
-          problem.given_rounds, problem.resumed,       problem.reduced};
+  problem.settings = settings;
+  return problem;
 }
 
 std::vector<State> other_unstable_motions(const CycleProblem& problem)

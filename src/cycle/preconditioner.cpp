@@ -1,7 +1,6 @@
 #include "preconditioner.hpp"
 
 #include "floquet.hpp"
-#include "squeal/base/cost.hpp"
 #include "squeal/cycle/reduced_flow.hpp"
 
 #include <span>
@@ -22,7 +21,7 @@ struct RecordedInverse
 /// From the period that the map recorded last. Integrated once more, it gives the flow.
 void make(CycleProblem& problem, PeriodMap& map, std::shared_ptr<const ReducedModel>& kept, RecordedInverse& inverse)
 {
-  if (!map.recorded_start.get() || whole_tangent_is_cheap(2. * dofs_of(map.recorded_start))) return;
+  if (!map.recorded_start.get()) return;
   const Owned<Vec> start = copy_of(map.recorded_start.get()), end = copy_of(start.get()), rate = zeros_like(start);
   const double period = map.steps * map.recorded_step;
   flow_of(map).integrate(period, start, end, rate);

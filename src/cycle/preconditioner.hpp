@@ -8,8 +8,8 @@ namespace squeal
 {
 
 /// The preconditioner from the contact of the period that the map has recorded last when it is asked for first. None
-/// where all columns of the tangent are cheap, or no reduced model can be made. `kept`: that model, once it is made,
-/// which is then the problem's as well. Borrows all.
+/// where no reduced model can be made. `kept`: that model, once it is made, which is then the problem's as well.
+/// Borrows all.
 Preconditioner recorded_preconditioner(CycleProblem& problem, PeriodMap& map,
                                        std::shared_ptr<const ReducedModel>& kept);
 

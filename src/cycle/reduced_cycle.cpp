@@ -190,15 +190,8 @@ void update_correction(ReducedSearch& search, const FreeMotion& motion)
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;
 }
 
-/// What shooting found, and in how many periods.
-struct Shot
-{
-  ReducedCycle cycle;
-  long periods = 0;
-};
-
 /// Shoots from `start`. Every rank does so by itself, on periods that are the same on all.
-Shot shoot(const ReducedSearch& search, const ReducedCycle& start, ReducedMap& map)
+ReducedCycle shoot(ReducedSearch& search, const ReducedCycle& start, ReducedMap& map)
 {
   const Flow flow = flow_of(map, search.energy);
   const Preconditioner preconditioner = preconditioner_of(search.correction, own_coordinates());
@@ -213,12 +206,12 @@ Shot shoot(const ReducedSearch& search, const ReducedCycle& start, ReducedMap& m
   if (found.ending == StageEnding::converged)
     found = prefer_fewer_rounds(problem, shooting, log, 2, std::move(found)); // which spares the full model that test
   const bool at_rest = found.ending == StageEnding::collapsed;
-  Shot shot{{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0,
-             at_rest ? std::nan("") : found.orbit.residual},
-            log.convergence.periods};
-  share_state(shot.cycle.state, map.comm); // ranks of other processors may round otherwise
-  MPI_Bcast(&shot.cycle.period, 1, MPI_DOUBLE, 0, map.comm);
-  return shot;
+  ReducedCycle cycle{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0,
+                     at_rest ? std::nan("") : found.orbit.residual};
+  share_state(cycle.state, map.comm); // ranks of other processors may round otherwise
+  MPI_Bcast(&cycle.period, 1, MPI_DOUBLE, 0, map.comm);
+  search.fidelity.reduced_periods += log.convergence.periods;
+  return cycle;
 }
 
 /// Why a reduced model of the active pairs would not be small; empty if it would.
@@ -258,11 +251,11 @@ ReducedCycle find_reduced_cycle(ReducedSearch& search, const ReducedCycle& start
 {
   const double clock = MPI_Wtime();
   ReducedMap map = period_map_of(search, steps);
-  Shot shot = shoot(search, start, map);
-  shot.cycle.energy = mean_energy(map, shot.cycle.period, shot.cycle.state);
-  search.fidelity.reduced_periods += shot.periods + 1;
+  ReducedCycle cycle = shoot(search, start, map);
+  cycle.energy = mean_energy(map, cycle.period, cycle.state);
+  ++search.fidelity.reduced_periods;
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;
-  return shot.cycle;
+  return cycle;
 }
 
 void estimate_reduced_step_errors(ReducedSearch& search, const ReducedCycle& cycle)

@@ -75,10 +75,10 @@ public:
       : correction_(correction),
         options_(correction.options.shooting), map_{correction.problem.sliding, correction.problem.step,
                                                     coarse.steps_per_period, coarse.theta},
-        orbit_(copy_of(coarse.orbit)), before_(copy_of(coarse.orbit)),
-        keeper_(map_.sliding.structure), flow_{[this](double period, Vec from, Vec end, Vec rate)
-                                               { measure(period, from, end, rate); },
-                                               map_.sliding.structure.M, map_.sliding.structure.K},
+        orbit_(copy_of(coarse.orbit)),
+        before_(copy_of(coarse.orbit)), flow_{[this](double period, Vec from, Vec end, Vec rate)
+                                              { measure(period, from, end, rate); },
+                                              map_.sliding.structure.M, map_.sliding.structure.K},
         problem_(orbit_problem(correction, flow_, coarse.orbit.period)),
         progress_(comm_of(map_.sliding.structure.load), "cycle, finer steps", 20), log_{progress_, coarse.convergence}
   {
@@ -88,7 +88,7 @@ public:
     multisecant_.target_error = accuracy / 2;
     multisecant_.exact = whole_tangent_is_cheap(2. * dofs_of(coarse.orbit.state));
     add_tangent(map_, flow_);
-    keeper_.watch(flow_);
+    keep_cycles_of(flow_, map_.sliding.structure);
   }
   FineShooting(const FineShooting&) = delete;
   FineShooting& operator=(const FineShooting&) = delete;
@@ -167,7 +167,6 @@ private:
   PeriodMap map_;
   Orbit orbit_, before_; // the last one; that of the steps before
   MeasuredPeriod measured_{};
-  CycleKeeper keeper_;
   Flow flow_;
   OrbitProblem problem_;
   Progress progress_;

@@ -128,6 +128,16 @@ MatrixXd energies(const Attachments& attachments, const MatrixXd& energy_of_mode
   return result;
 }
 
+/// Orthonormal combinations of shapes that are orthonormal in the energy, by falling period: u'M u against the energy.
+/// `mass`: of the shapes. Sets `slow` to the number of those that swing by less than four times omega [rad/s].
+MatrixXd by_falling_period(const MatrixXd& mass, double omega, Index& slow)
+{
+  const SymmetricEigenpairs spectrum = solve_dense_symmetric((mass + mass.transpose()) / 2);
+  constexpr double fastest = 4; // times omega
+  slow = (spectrum.lambda.array() * (1 + fastest * fastest) * omega * omega > 1).count();
+  return spectrum.y.rowwise().reverse();
+}
+
 } // namespace
 
 double highest_frequency(const std::vector<ComplexMode>& modes)
@@ -192,14 +202,6 @@ Owned<Mat> force_rows(const Eigen::SparseMatrix<double>& forces, Mat BZ)
   Owned<Mat> P;
   check(MatMatMult(transposed, BZ, MAT_INITIAL_MATRIX, PETSC_DEFAULT, P.put()));
   return P;
-}
-
-MatrixXd by_falling_period(const MatrixXd& mass, double omega, Index& slow)
-{
-  const SymmetricEigenpairs spectrum = solve_dense_symmetric((mass + mass.transpose()) / 2);
-  constexpr double fastest = 4; // times omega
-  slow = (spectrum.lambda.array() * (1 + fastest * fastest) * omega * omega > 1).count();
-  return spectrum.y.rowwise().reverse();
 }
 
 MultiVector make_basis(ReducedModel& model, const Attachments& attachments, const ModeColumns& modes,

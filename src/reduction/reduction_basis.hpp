@@ -52,8 +52,4 @@ MultiVector make_basis(ReducedModel& model, const Attachments& attachments, cons
                        const Eigen::MatrixXd& energy_of_modes, const Eigen::MatrixXd& of_modes, Mat M,
                        const AttachmentLimits& limits);
 
-/// Orthonormal combinations of shapes that are orthonormal in the energy, by falling period: u'M u against the energy.
-/// `mass`: of the shapes. Sets `slow` to the number of those that swing by less than four times omega [rad/s].
-Eigen::MatrixXd by_falling_period(const Eigen::MatrixXd& mass, double omega, Eigen::Index& slow);
-
 } // namespace squeal

@@ -29,7 +29,6 @@ struct LimitCycle
   Orbit free;              // the end of the free motion that the search went on from; null where there was none
   StepCosts costs;         // of the last theta step made
   bool cut_short = false;  // the run was asked to end in the search for multipliers, or for finer steps
-  std::vector<OffsetSpread> spreads{}; // over the offsets that joints hold; where the whole tangent is cheap
 };
 
 struct ReducedModel;
@@ -48,7 +47,7 @@ struct CycleProblem
   const LinearisedSliding& linearised;
   const std::vector<ComplexMode>& modes; // all in the band
   UnstableModes unstable;                // those that it starts from; the cycle follows the first
-  const CycleSettings& settings;
+  CycleSettings settings;
   const StepOptions& step;
   const ModesOptions& modes_options; // of real modes beyond the band
   Mat probes = nullptr;
@@ -59,8 +58,8 @@ struct CycleProblem
   const ReducedModel* reduced = nullptr; // whose cycle it starts from
 };
 
-/// The problem with other settings, which it borrows.
-CycleProblem with_settings(const CycleProblem& problem, const CycleSettings& settings);
+/// The problem with other settings.
+CycleProblem with_settings(CycleProblem problem, const CycleSettings& settings);
 
 /// Those of the unstable modes that are not followed, at their estimated amplitudes, about the equilibrium.
 std::vector<State> other_unstable_motions(const CycleProblem& problem);
