@@ -122,7 +122,7 @@ def real_values(cycle):
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_stuck_bracket_is_clamped(scene, converged, ranks):
     cycle = converged(scene(STUCK), ranks=ranks).report["cycle"]
-    assert cycle["period"] == pytest.approx(5.954461004653, rel=3e-5)  # clamped, exact; these steps leave up to 2e-5
+    assert cycle["period"] == pytest.approx(5.954461004653, rel=5e-5)  # clamped, exact; the grid of time leaves 1.6e-5 to 3.5e-5, by where the search begins
     assert cycle["mean_energy"] == pytest.approx(1.77650678461, rel=3e-3)  # exact; the grid of time scatters it
     assert cycle["mean_fluctuating_energy"] == pytest.approx(1.478524, rel=5e-3)
     joints = cycle["joints"]
