@@ -116,7 +116,8 @@ double memory_of_factor(const Sizes& sizes)
 /// factor of that and, with springs, what these take off again.
 double memory_of_equilibrium(const Sizes& sizes)
 {
-  return matrix_entry * sizes.entries + memory_of_factor(sizes) + 5 * number * sizes.pairs * sizes.pairs;
+  return matrix_entry * sizes.entries + memory_of_factor(sizes) + sizes.condensed_operator() +
+         4 * number * sizes.pairs * sizes.pairs;
 }
 
 /// Six matrices: M and K of the frictionless problem, M, C and K of the sliding one, and C with friction. The pencil of
@@ -209,8 +210,7 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   const double free = free_memory(comm);
   const bool in_factor = stays_in_factor(sizes, free);
   const bool whole_operator = scene.cycle.enabled || (!in_factor && !shares_operator(sizes)); // tangents need one
-  forecast.on_rank_zero =
-      std::max(whole_operator ? sizes.condensed_operator() : 0, 4 * number * sizes.pairs * sizes.pairs);
+  forecast.on_rank_zero = sizes.condensed_operator() + (whole_operator ? 0 : 4 * number * sizes.pairs * sizes.pairs);
   // two products a step, each of which reads half of W, or the rows of E twice
   const double contact = in_factor ? 4 * number * sizes.factor.border_entries : sizes.condensed_operator();
   forecast.step_seconds = seconds_of_calls + (sizes.factor.bytes + contact) / sizes.ranks / bytes_a_second;

@@ -1,6 +1,5 @@
 #include "squeal/algebra/paired_matrices.hpp"
 
-#include "registers.hpp"
 #include "sparse_product.hpp"
 #include "squeal/algebra/panel.hpp"
 
@@ -14,88 +13,40 @@ namespace
 
 using Two = double __attribute__((vector_size(16)));
 
-/// The columns that PairedRows hold: a rank's own from the diagonal on, for their mirror images as well, or others'.
-enum class ColumnsOf
+/// Entries of both matrices at x_j = (v_j, u_j). Without fused products, so that K u of a body that moves without
+/// strain is zero to the last bit.
+Two entry_times(const std::array<double, 2>& value, const Two* x)
 {
-  own,
-  others
-};
+  Two entry;
+  std::memcpy(&entry, &value, sizeof entry);
+  return entry * *x;
+}
 
-/// y += A x. With two parts an Entry belongs to one matrix, and a row of x holds v and then u of all trajectories, each
-/// in so many Vectors. With one part and an Entry of two numbers a row of x is (v, u).
-template <ColumnsOf which, std::size_t parts, class Entry, class Vector, std::size_t vectors>
-SQUEAL_INLINE void add_product(const PairedRows& matrices, const double* x, double* y)
+/// y += A x of this rank's own columns, which are stored from the diagonal on.
+void add_own(const PairedRows& matrices, const Two* x, Two* y)
 {
-  constexpr std::size_t width = sizeof(Vector) / sizeof(double), stride = parts * vectors * width;
-  constexpr bool mirrored = which == ColumnsOf::own;
-  const PetscInt* const columns = matrices.columns.data();
-  const std::array<double, 2>* const values = matrices.values.data();
-  Entry entry;
-  Vector own[parts * vectors], sums[parts * vectors], other;
   for (std::size_t i = 0; i + 1 < matrices.starts.size(); ++i)
   {
     const auto first = static_cast<std::size_t>(matrices.starts[i]),
                end = static_cast<std::size_t>(matrices.starts[i + 1]);
-    if (first == end) continue;
-    for (std::size_t n = 0; n < parts * vectors; ++n)
+    Two sum = y[i] + entry_times(matrices.values[first], x + i);
+    for (std::size_t k = first + 1; k < end; ++k)
     {
-      std::memcpy(&sums[n], y + i * stride + n * width, sizeof other);
-      if constexpr (mirrored)
-      {
-        std::memcpy(&own[n], x + i * stride + n * width, sizeof other);
-        std::memcpy(&entry, &values[first][n / vectors], sizeof entry); // on the diagonal
-        sums[n] += entry * own[n];
-      }
+      const PetscInt j = matrices.columns[k];
+      sum += entry_times(matrices.values[k], x + j);
+      y[j] += entry_times(matrices.values[k], x + i);
     }
-    for (std::size_t k = mirrored ? first + 1 : first; k < end; ++k)
-      for (std::size_t n = 0; n < parts * vectors; ++n)
-      {
-        const std::size_t j = static_cast<std::size_t>(columns[k]) * stride + n * width;
-        std::memcpy(&entry, &values[k][n / vectors], sizeof entry);
-        std::memcpy(&other, x + j, sizeof other);
-        sums[n] += entry * other;
-        if constexpr (mirrored)
-        {
-          std::memcpy(&other, y + j, sizeof other);
-          other += entry * own[n];
-          std::memcpy(y + j, &other, sizeof other);
-        }
-      }
-    for (std::size_t n = 0; n < parts * vectors; ++n) std::memcpy(y + i * stride + n * width, &sums[n], sizeof other);
+    y[i] = sum;
   }
 }
 
-/// 4 or 8 trajectories.
-template <ColumnsOf which>
-SQUEAL_INLINE void add_lanes(const PairedRows& matrices, std::size_t lanes, const double* x, double* y)
+/// y += A x of other ranks' columns.
+void add_foreign(const PairedRows& matrices, const Two* x, Two* y)
 {
-  if (lanes == 4)
-    add_product<which, 2, double, Four, 1>(matrices, x, y);
-  else if (SQUEAL_HAS_AVX512)
-    add_product<which, 2, double, Eight, 1>(matrices, x, y);
-  else
-    add_product<which, 2, double, Four, 2>(matrices, x, y);
-}
-
-SQUEAL_SIMD void add_own(const PairedRows& matrices, std::size_t lanes, const double* x, double* y)
-{
-  add_lanes<ColumnsOf::own>(matrices, lanes, x, y);
-}
-
-SQUEAL_SIMD void add_others(const PairedRows& matrices, std::size_t lanes, const double* x, double* y)
-{
-  add_lanes<ColumnsOf::others>(matrices, lanes, x, y);
-}
-
-/// One trajectory without fused products: K u of a body that moves without strain is then zero to the last bit.
-template <ColumnsOf which> void add(const PairedRows& matrices, std::size_t lanes, const double* x, double* y)
-{
-  if (lanes == 1)
-    add_product<which, 1, Two, Two, 1>(matrices, x, y);
-  else if (which == ColumnsOf::own)
-    add_own(matrices, lanes, x, y);
-  else
-    add_others(matrices, lanes, x, y);
+  for (std::size_t i = 0; i + 1 < matrices.starts.size(); ++i)
+    for (auto k = static_cast<std::size_t>(matrices.starts[i]); k < static_cast<std::size_t>(matrices.starts[i + 1]);
+         ++k)
+      y[i] += entry_times(matrices.values[k], x + matrices.columns[k]);
 }
 
 /// Columns of other ranks in this rank's rows, ascending.
@@ -188,42 +139,31 @@ std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
   return matrices;
 }
 
-void multiply_both(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> u,
-                   std::span<const Vec> Mv, std::span<const Vec> Ku)
+void multiply_both(const PairedMatrices& matrices, const std::array<Vec, 2>& of, const std::array<Vec, 2>& to)
 {
-  constexpr std::size_t parts = 2;
-  const std::array from{v, u}, to{Mv, Ku};
-  const std::size_t rows = matrices.own.starts.size() - 1, lanes = std::min<std::size_t>(8, lanes_for(v.size())),
-                    stride = parts * lanes;
-  std::vector<double> x(stride * rows), y, z(stride * matrices.received);
-  const RowType row(stride);
-  for (std::size_t first = 0; first < from[0].size(); first += lanes)
+  const std::size_t rows = matrices.own.starts.size() - 1;
+  std::vector<Two> x(rows), y(rows, Two{}), z(matrices.received);
+  for (std::size_t part = 0; part < 2; ++part)
   {
-    const std::size_t count = std::min(lanes, from[0].size() - first);
-    std::vector<const double*> read(parts * count);
-    std::vector<double*> written(parts * count);
-    for (std::size_t k = 0; k < parts * count; ++k)
-    {
-      check(VecGetArrayRead(from[k / count][first + k % count], &read[k]));
-      check(VecGetArrayWrite(to[k / count][first + k % count], &written[k]));
-    }
-    for (std::size_t i = 0; i < rows; ++i)
-      for (std::size_t k = 0; k < parts * count; ++k) x[i * stride + k / count * lanes + k % count] = read[k][i];
-    y.assign(x.size(), 0.);
-    add<ColumnsOf::own>(matrices.own, lanes, x.data(), y.data());
-    if (ranks_of(matrices.comm) > 1)
-    {
-      check(PetscSFBcastBegin(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
-      check(PetscSFBcastEnd(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
-      add<ColumnsOf::others>(matrices.foreign, lanes, z.data(), y.data());
-    }
-    for (std::size_t i = 0; i < rows; ++i)
-      for (std::size_t k = 0; k < parts * count; ++k) written[k][i] = y[i * stride + k / count * lanes + k % count];
-    for (std::size_t k = 0; k < parts * count; ++k)
-    {
-      check(VecRestoreArrayRead(from[k / count][first + k % count], &read[k]));
-      check(VecRestoreArrayWrite(to[k / count][first + k % count], &written[k]));
-    }
+    const PetscScalar* from = nullptr;
+    check(VecGetArrayRead(of[part], &from));
+    for (std::size_t i = 0; i < rows; ++i) x[i][part] = from[i];
+    check(VecRestoreArrayRead(of[part], &from));
+  }
+  add_own(matrices.own, x.data(), y.data());
+  if (ranks_of(matrices.comm) > 1)
+  {
+    const RowType row(2);
+    check(PetscSFBcastBegin(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
+    check(PetscSFBcastEnd(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
+    add_foreign(matrices.foreign, z.data(), y.data());
+  }
+  for (std::size_t part = 0; part < 2; ++part)
+  {
+    PetscScalar* result = nullptr;
+    check(VecGetArrayWrite(to[part], &result));
+    for (std::size_t i = 0; i < rows; ++i) result[i] = y[i][part];
+    check(VecRestoreArrayWrite(to[part], &result));
   }
 }
 

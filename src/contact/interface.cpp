@@ -354,39 +354,6 @@ std::vector<double> drive_directions(const Interface& interface)
   return result;
 }
 
-std::vector<double> sliding_axes(const Interface& interface)
-{
-  std::vector<double> result = drive_directions(interface);
-  const TangentView e(result, interface.directions);
-  for (std::size_t pair = 0; pair < static_cast<std::size_t>(interface.pairs); ++pair)
-    if (drive_speed(interface, pair) == 0) e.of(pair)[0] = 1;
-  return result;
-}
-
-Interface along(const Interface& interface, const std::vector<double>& axes)
-{
-  Interface result;
-  result.pairs = interface.pairs;
-  result.directions = 1;
-  const PairRows<PetscInt> from(interface.directions);
-  const TangentView e(axes, interface.directions);
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(interface.B, &first, &last));
-  // a pair belongs where its normal row is; its other rows may be another rank's
-  const auto first_pair_from = [&](PetscInt row) { return (row + from.per_pair() - 1) / from.per_pair(); };
-  std::vector<SparseRow> rows;
-  for (PetscInt pair = first_pair_from(first); pair < first_pair_from(last); ++pair)
-  {
-    rows.push_back({{from.normal(pair), 1}});
-    rows.emplace_back();
-    PetscInt row = from.normal(pair);
-    for (const double component : e.of(static_cast<std::size_t>(pair))) rows.back()[++row] = component;
-  }
-  const Owned<Mat> taken = matrix_of_rows(rows, last - first, comm_of(interface.B));
-  check(MatMatMult(taken, interface.B, MAT_INITIAL_MATRIX, PETSC_DEFAULT, result.B.put()));
-  return result;
-}
-
 std::vector<double> drive_friction(const Interface& interface)
 {
   std::vector<double> mu;

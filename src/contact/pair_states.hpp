@@ -102,7 +102,7 @@ struct PairStates
     return {entries(at.r, pair, of.directions),
             entries(at.w, pair, of.directions),
             friction.mu[pair],
-            {e[0], e.size() > 1 ? e[1] : 0},
+            {e.empty() ? 0 : e[0], e.size() > 1 ? e[1] : 0},
             of.rho[pair],
             grazing,
             smooth};

@@ -29,20 +29,20 @@ Vector3d unit_motions(const NaturalScale& rho)
 
 } // namespace
 
-StickSlipOperator make_stick_slip_operator(MatrixXd N, MatrixXd M, int directions, std::vector<int> contact)
+StickSlipOperator make_stick_slip_operator(MatrixXd N, MatrixXd M, const VectorXd& own, int directions,
+                                           std::vector<int> contact)
 {
   StickSlipOperator result{std::move(N), std::move(M), directions, {}, 0, std::move(contact)};
-  result.compliance = result.M.diagonal().maxCoeff();
+  result.compliance = own.maxCoeff();
   for (Index row = 0; row < result.M.rows(); ++row) // neither side moves along it: a spring there carries nothing
     if (result.M.row(row).isZero(0)) result.M(row, row) = result.compliance;
   const PairRows<Index> rows(directions);
   for (Index pair = 0; pair < static_cast<Index>(result.contact.size()); ++pair)
   {
-    PairBlock own{};
+    PairBlock block{};
     for (Index k = 0; k < rows.per_pair(); ++k)
-      own[static_cast<std::size_t>(k)][static_cast<std::size_t>(k)] =
-          result.M(rows.normal(pair) + k, rows.normal(pair) + k);
-    result.rho.push_back(natural_scale(own, result.compliance));
+      block[static_cast<std::size_t>(k)][static_cast<std::size_t>(k)] = own(rows.normal(pair) + k);
+    result.rho.push_back(natural_scale(block, result.compliance));
   }
   return result;
 }

@@ -48,18 +48,20 @@ MatrixXd generators(const PathProblem& problem, const StickSlipFriction& frictio
   return result;
 }
 
-/// A x - b at the x >= 0 that makes it smallest (Lawson and Hanson 1974, algorithm NNLS).
-VectorXd least_rest(const MatrixXd& A, const VectorXd& b)
+/// A x - b at the x >= 0 that makes it smallest (Lawson and Hanson 1974, algorithm NNLS); of no size where `most`
+/// exchanges do not find it.
+VectorXd least_rest(const MatrixXd& A, const VectorXd& b, Index most)
 {
   std::vector<Index> passive;
   VectorXd x = VectorXd::Zero(A.cols()), rest = -b;
   const double enough = 1e-12 * b.norm() * A.colwise().norm().maxCoeff();
-  for (Index iteration = 0; iteration < 3 * A.cols(); ++iteration)
+  for (Index iteration = 0;; ++iteration)
   {
     VectorXd gain = -A.transpose() * rest;
     for (const Index i : passive) gain[i] = 0;
     Index entering = 0;
-    if (!(gain.maxCoeff(&entering) > enough)) break;
+    if (!(gain.maxCoeff(&entering) > enough)) return rest;
+    if (iteration == most) return {};
     passive.push_back(entering);
     for (bool feasible = false; !feasible && !passive.empty();)
     {
@@ -75,7 +77,6 @@ VectorXd least_rest(const MatrixXd& A, const VectorXd& b)
     }
     rest = A * x - b;
   }
-  return rest;
 }
 
 } // namespace
@@ -91,9 +92,24 @@ std::optional<VectorXd> unresisted_motion(const PathProblem& problem, const Stic
   const MatrixXd rigid = spectrum.eigenvectors().leftCols(free);
   const VectorXd drive = -problem.kappa * (rigid.transpose() * q);
   if (drive.norm() <= 1e-12 * problem.kappa * q.norm()) return std::nullopt;
-  const VectorXd rest = least_rest(rigid.transpose() * generators(problem, friction), drive);
+  const MatrixXd forces = rigid.transpose() * generators(problem, friction);
+  const VectorXd rest = least_rest(forces, drive, 3 * forces.cols());
   if (rest.norm() <= 1e-9 * drive.norm()) return std::nullopt;
   return rigid * rest;
+}
+
+bool has_no_solution(const StickSlipOperator& of, const VectorXd& q)
+{
+  constexpr Index most = 300;     // exchanges, beyond which the proof would take longer than the search
+  constexpr double surely = 1e-7; // of the right side
+  MatrixXd both(q.size(), 2 * q.size());
+  both << of.N, -of.M / of.compliance;
+  return least_rest(both, q, most).norm() > surely * q.norm();
+}
+
+bool has_one_solution(const StickSlipOperator& of)
+{
+  return of.N.isIdentity(0) && Eigen::LLT<MatrixXd>((of.M + of.M.transpose()) / 2).info() == Eigen::Success;
 }
 
 } // namespace squeal

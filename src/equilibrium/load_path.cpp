@@ -1,7 +1,6 @@
 #include "load_path.hpp"
 
 #include "balance.hpp"
-#include "squeal/algebra/lent_cores.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/run_control.hpp"
 
@@ -24,14 +23,50 @@ VectorXd as_vector(const std::vector<double>& values)
 }
 
 /// u + K'^-1 (load + B' forces - K' u): a step of iterative refinement.
-void displace(const Held& held, const Interface& interface, Vec load, const std::vector<double>& forces, Vec u)
+void displace(const PathOperators& operators, const Interface& interface, Vec load, const std::vector<double>& forces,
+              Vec u)
 {
   const auto rhs = copy_of(load), residual = zeros_like(load), correction = zeros_like(load);
-  add_reactions(interface, forces, rhs);
-  check(MatMult(held.augmented, u, residual));
+  const Held& held = operators.held;
+  if (interface.pairs > 0) add_reactions(interface, forces, rhs);
+  check(MatMult(held.augmented ? held.augmented.get() : operators.K.get(), u, residual));
   check(VecAYPX(residual, -1, rhs));
   solve(held.factor, residual, correction);
   check(VecAXPY(u, 1, correction));
+}
+
+/// Tangential rows of a pair among those of the problem.
+int directions_of(const PathOperators& operators, const Interface& interface)
+{
+  return operators.driven ? 0 : interface.directions;
+}
+
+/// The entries of a contact vector in the rows of the problem.
+std::vector<double> rows_of_problem(const PathOperators& operators, const Interface& interface,
+                                    std::vector<double> contact_vector)
+{
+  if (!operators.driven || contact_vector.empty()) return contact_vector;
+  std::vector<double> normal;
+  for (std::size_t i = 0; i < interface.gap.size(); ++i)
+    normal.push_back(PairView(contact_vector, interface.directions).normal(i));
+  return normal;
+}
+
+/// Reactions on all rows of the pairs: friction of driven ones follows the normal reactions r.
+std::vector<double> with_friction(const PathOperators& operators, const Interface& interface,
+                                  const std::vector<double>& r)
+{
+  if (!operators.driven) return r;
+  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
+  const TangentView e(directions, interface.directions);
+  std::vector<double> forces(interface.size());
+  const PairView view(forces, interface.directions);
+  for (std::size_t i = 0; i < r.size(); ++i)
+  {
+    view.normal(i) = r[i];
+    for (std::size_t k = 0; k < e.of(i).size(); ++k) view.tangential(i)[k] = mu[i] * r[i] * e.of(i)[k];
+  }
+  return forces;
 }
 
 /// The steps of the path with the motion of the rows by their loads alone. Collective.
@@ -42,10 +77,11 @@ std::vector<PathEnd> ends_of(const PathOperators& operators, const Structure& st
   const auto add = [&](const std::string& name, Vec load, double friction)
   {
     const auto u = zeros_like(load);
-    for (int pass = 0; pass < 2; ++pass) displace(operators.held, interface, load, nothing, u);
-    ends.push_back({name, as_vector(relative(interface, u)), friction});
+    for (int pass = 0; pass < 2; ++pass) displace(operators, interface, load, nothing, u);
+    ends.push_back({name, as_vector(rows_of_problem(operators, interface, relative(interface, u))), friction});
   };
-  for (const PathStep& step : structure.path) add(step.name, step.load, step.driven_friction);
+  for (const PathStep& step : structure.path)
+    if (!operators.driven) add(step.name, step.load, step.driven_friction);
   if (ends.empty()) add("load", structure.load, 1);
   return ends;
 }
@@ -58,28 +94,64 @@ std::vector<int> contacts_of(const Interface& interface)
   return contact;
 }
 
-StickSlipFriction friction_of(const Interface& interface)
+StickSlipFriction friction_of(const PathOperators& operators, const Interface& interface)
 {
+  if (operators.driven) return {std::vector<double>(interface.gap.size(), 0.), {}};
   StickSlipFriction friction{drive_friction(interface), drive_directions(interface)};
   for (std::size_t i = 0; i < friction.mu.size(); ++i)
     if (drive_speed(interface, i) == 0) friction.mu[i] = friction_coefficient(interface.friction.of(i), 0).value;
   return friction;
 }
 
-/// N = 1 - kappa D and M = D, to which compliances c in series with the rows add: the unknown motions are w + c r.
+/// The compliance of the rows to each other's forces, without friction, and with that of driven pairs.
+struct Compliance
+{
+  MatrixXd own, with_friction;
+};
+
+Compliance compliance_of(const PathOperators& operators, const Interface& interface)
+{
+  const PairRows<Index> rows(interface.directions);
+  const Index pairs = interface.pairs, size = rows.rows_of(pairs);
+  const Eigen::Map<const MatrixXd> D(operators.D.data(), size, size);
+  if (!operators.driven) return {D, D};
+  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
+  const auto normal = Eigen::seqN(0, pairs, rows.per_pair());
+  MatrixXd M = D(normal, normal);
+  Compliance result{M, {}};
+  for (Index pair = 0; pair < pairs; ++pair)
+    for (Index k = 0; k < rows.directions; ++k)
+    {
+      const auto i = static_cast<std::size_t>(pair);
+      const double e = TangentView(directions, interface.directions).of(i)[static_cast<std::size_t>(k)];
+      M.col(pair) += mu[i] * e * D(normal, rows.tangential(pair) + k);
+    }
+  result.with_friction = std::move(M);
+  return result;
+}
+
+/// N = 1 - kappa D and M with friction, to which compliances c in series with the rows add: the unknown motions are
+/// w + c r.
 StickSlipOperator operator_of(const PathOperators& operators, const Interface& interface)
 {
-  MatrixXd N = -operators.held.kappa * operators.D, M = operators.D;
+  auto [N, M] = compliance_of(operators, interface);
+  VectorXd own = N.diagonal();
+  N *= -operators.held.kappa;
   N.diagonal().array() += 1;
   N = (N.array().abs() < 1e-13).select(0, N); // rounding of 1 - 1: the pair alone holds its body
-  if (const std::vector<double> c = compliance_of_rows(interface); !c.empty()) M += N * as_vector(c).asDiagonal();
-  return make_stick_slip_operator(std::move(N), std::move(M), interface.directions, contacts_of(interface));
+  if (const auto c = rows_of_problem(operators, interface, compliance_of_rows(interface)); !c.empty())
+  {
+    M += N * as_vector(c).asDiagonal();
+    own += N.diagonal().cwiseProduct(as_vector(c));
+  }
+  return make_stick_slip_operator(std::move(N), std::move(M), own, directions_of(operators, interface),
+                                  contacts_of(interface));
 }
 
 /// The result that rank 0 finds on the rows of the pairs, and every rank has then.
 struct Found
 {
-  int stopped = 0, completed = 0, increments = 0, iterations = 0, index = 0;
+  int stopped = 0, completed = 0, impossible = 0, unique = 0, increments = 0, iterations = 0, index = 0;
   double change = 0, reciprocal_condition = 0;
   std::string reason{};
   std::vector<double> r, w, offset;
@@ -88,7 +160,8 @@ struct Found
 
 void share(Found& found, MPI_Comm comm)
 {
-  for (int* number : {&found.stopped, &found.completed, &found.increments, &found.iterations, &found.index})
+  for (int* number : {&found.stopped, &found.completed, &found.impossible, &found.unique, &found.increments,
+                      &found.iterations, &found.index})
     MPI_Bcast(number, 1, MPI_INT, 0, comm);
   for (double* number : {&found.change, &found.reciprocal_condition}) MPI_Bcast(number, 1, MPI_DOUBLE, 0, comm);
   broadcast(found.reason, comm);
@@ -152,17 +225,20 @@ struct EndOfPath
 
 /// On rank 0.
 void walk_to_end(const PathOperators& operators, const Interface& interface, std::vector<PathEnd> ends,
-                 const std::optional<StickSlipState>& from, EndOfPath& end)
+                 const PathStart& start, EndOfPath& end)
 {
   end.of = operator_of(operators, interface);
-  if (std::optional<DividedOperator> stiff = divided(end.of))
+  if (std::optional<DividedOperator> stiff = operators.driven ? std::nullopt : divided(end.of))
   {
     end.of = std::move(stiff->of);
     end.by = std::move(stiff->by);
   }
   for (PathEnd& step : ends) step.q = end.divided(step.q);
-  const PathProblem problem{end.of, end.by ? 1 : operators.held.kappa, interface.gap, friction_of(interface), ends};
-  const PathWalk walk = from ? hold_at(problem, *from) : walk_path(problem);
+  const PathProblem problem{end.of, end.by ? 1 : operators.held.kappa, interface.gap, friction_of(operators, interface),
+                            ends};
+  const PathWalk walk = operators.driven ? rest_of(problem, start.closed)
+                        : start.state    ? hold_at(problem, *start.state)
+                                         : walk_path(problem);
   end.friction = walk.friction;
   if (walk.completed) end.least_force = end.of.least_force(walk.q);
   Found& found = end.found;
@@ -175,9 +251,13 @@ void walk_to_end(const PathOperators& operators, const Interface& interface, std
   found.offset = as_list(walk.offset);
   if (!walk.completed)
   {
-    found.reason = from ? walk.reason : mechanism(problem, walk, interface);
+    if (operators.driven)
+      found.impossible = has_no_solution(end.of, walk.q);
+    else
+      found.reason = start.state ? walk.reason : mechanism(problem, walk, interface);
     return;
   }
+  if (operators.driven) found.unique = has_one_solution(end.of);
   end.system.emplace(end.of, end.friction, walk.state);
   found.statuses = end.system->statuses();
   found.index = end.system->index();
@@ -191,24 +271,29 @@ void settle(const PathOperators& operators, const Structure& structure, const In
 {
   Found& found = end.found;
   const MPI_Comm comm = comm_of(structure.load);
-  const std::vector<double> compliance = compliance_of_rows(interface);
+  const std::vector<double> compliance = rows_of_problem(operators, interface, compliance_of_rows(interface));
   for (int pass = 0;; ++pass)
   {
     // motion of the rows: w - offset, less what gives in series with them
-    std::vector<double> moved = found.w, forces = found.r;
+    std::vector<double> moved = found.w;
     for (std::size_t k = 0; k < moved.size(); ++k) moved[k] -= found.offset[k];
     for (std::size_t k = 0; k < compliance.size(); ++k) moved[k] -= compliance[k] * found.r[k];
-    for (std::size_t k = 0; k < moved.size(); ++k) forces[k] += operators.held.kappa * moved[k];
-    displace(operators.held, interface, structure.load, forces, u);
+    std::vector<double> forces = with_friction(operators, interface, found.r);
+    const PairView<double> all(forces, interface.directions);
+    const PairView<const double> motion(moved, directions_of(operators, interface));
+    for (std::size_t i = 0; i < all.pairs(); ++i)
+      for (std::size_t k = 0; k < motion.of(i).size(); ++k) all.of(i)[k] += operators.held.kappa * motion.of(i)[k];
+    displace(operators, interface, structure.load, forces, u);
     if (pass == 2) return;
-    const VectorXd error = as_vector(relative(interface, u)) - as_vector(moved);
-    on_rank_zero_with_lent_cores(comm, interface.size(),
-                                 [&]
-                                 {
-                                   const StickSlipState change = end.system->response(end.divided(error));
-                                   found.r = as_list(as_vector(found.r) + change.r);
-                                   found.w = as_list(as_vector(found.w) + change.w);
-                                 });
+    if (interface.pairs == 0) continue;
+    const VectorXd error = as_vector(rows_of_problem(operators, interface, relative(interface, u))) - as_vector(moved);
+    on_rank_zero(comm,
+                 [&]
+                 {
+                   const StickSlipState change = end.system->response(end.divided(error));
+                   found.r = as_list(as_vector(found.r) + change.r);
+                   found.w = as_list(as_vector(found.w) + change.w);
+                 });
     broadcast(found.r, comm);
     broadcast(found.w, comm);
   }
@@ -231,10 +316,12 @@ LoadHistory history_of(const Interface& interface, const Found& found)
 }
 
 /// Sets reactions, gaps and closed pairs of every rank.
-void set_pairs(const Interface& interface, const Found& found, Equilibrium& equilibrium)
+void set_pairs(const PathOperators& operators, const Interface& interface, const Found& found, Equilibrium& equilibrium)
 {
-  const PairView w(found.w, interface.directions);
-  equilibrium.reactions = found.r;
+  const PairView w(found.w, directions_of(operators, interface));
+  std::vector<double> reactions = found.r;
+  for (double& r : reactions) r = operators.driven ? std::max(0., r) : r;
+  equilibrium.reactions = with_friction(operators, interface, reactions);
   const PairView<double> r(equilibrium.reactions, interface.directions);
   for (std::size_t i = 0; i < found.statuses.size(); ++i)
   {
@@ -246,11 +333,13 @@ void set_pairs(const Interface& interface, const Found& found, Equilibrium& equi
 }
 
 /// The natural map of the pairs by u's own motion of their rows. Collective.
-double residual_of(const Interface& interface, const EndOfPath& end, const Equilibrium& equilibrium)
+double residual_of(const PathOperators& operators, const Interface& interface, const EndOfPath& end,
+                   const Equilibrium& equilibrium)
 {
-  StickSlipState at{as_vector(equilibrium.reactions),
-                    as_vector(slip_positions(interface, equilibrium.u, equilibrium.reactions)) +
-                        as_vector(end.found.offset)};
+  const auto rows = [&](std::vector<double> x)
+  { return as_vector(rows_of_problem(operators, interface, std::move(x))); };
+  StickSlipState at{rows(equilibrium.reactions), rows(slip_positions(interface, equilibrium.u, equilibrium.reactions)) +
+                                                     as_vector(end.found.offset)};
   double residual = 0;
   on_rank_zero(comm_of(interface.B),
                [&] { residual = stick_slip_residual(end.of, end.friction, at, end.least_force); });
@@ -262,55 +351,99 @@ double residual_of(const Interface& interface, const EndOfPath& end, const Equil
 
 PathOperators path_operators(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)
 {
-  PathOperators operators{
-      shared(structure.K.get()), shared(interface.B.get()), hold_by_all_rows(structure, interface, options.factor), {}};
-  const std::vector<double> D = operators.held.factor.condensed(1);
-  const auto size = static_cast<Index>(rank_of(comm_of(structure.load)) == 0 ? interface.size() : 0);
-  operators.D = MatrixXd::Map(D.data(), size, size); // symmetric
+  const bool driven = !has_undriven_pairs(interface);
+  PathOperators operators{shared(structure.K.get()),
+                          shared(interface.B.get()),
+                          driven,
+                          driven ? hold(structure, interface, options.factor)
+                                 : hold_by_all_rows(structure, interface, options.factor),
+                          {}};
+  if (interface.pairs > 0) operators.D = operators.held.factor.condensed(1);
   return operators;
 }
 
-Equilibrium find_by_path(const PathOperators& operators, const Structure& structure, const Interface& interface,
-                         const std::optional<StickSlipState>& from)
+namespace
 {
-  const MPI_Comm comm = comm_of(structure.load);
-  const std::vector<PathEnd> ends = ends_of(operators, structure, interface);
-  EndOfPath end;
-  on_rank_zero_with_lent_cores(comm, interface.size(),
-                               [&]
-                               {
-                                 try
-                                 {
-                                   walk_to_end(operators, interface, ends, from, end);
-                                 }
-                                 catch (const Interrupted&)
-                                 {
-                                   end.found.stopped = 1;
-                                 }
-                               });
-  Found& found = end.found;
-  share(found, comm);
-  if (found.stopped) join_parts(comm); // which throws
-  Equilibrium equilibrium;
-  equilibrium.u = zeros_like(structure.load);
-  equilibrium.directions = interface.directions;
-  equilibrium.auxiliary_stiffness = operators.held.kappa;
-  if (!found.completed)
-  {
-    equilibrium.outcome = {OutcomeKind::no_equilibrium, found.reason, found.iterations, 1};
-    equilibrium.closed.assign(interface.gap.size(), 0);
-    equilibrium.reactions.assign(interface.size(), 0.);
-    equilibrium.gaps.assign(interface.gap.size(), 0.);
-    return equilibrium;
-  }
+
+/// The outcome of a search that found nothing.
+Outcome failure(const PathOperators& operators, const Interface& interface, const Found& found)
+{
+  if (!operators.driven) return {OutcomeKind::no_equilibrium, found.reason, found.iterations, 1};
+  const std::vector<double> mu = drive_friction(interface);
+  const double friction = *std::ranges::max_element(mu);
+  if (found.impossible)
+    return {OutcomeKind::no_equilibrium,
+            format("no set of closed pairs balances the load at mu = %g: friction jams the structure, or it tips, "
+                   "slides away or lifts off",
+                   friction),
+            found.iterations, 1};
+  return {
+      OutcomeKind::not_converged,
+      format("no fitting set of closed pairs was found at mu = %g, and nothing proves that there is none", friction),
+      found.iterations, 1};
+}
+
+/// The equilibrium with the pairs that were found, by u's own motions.
+void settle_and_check(const PathOperators& operators, const Structure& structure, const Interface& interface,
+                      EndOfPath& end, Equilibrium& equilibrium)
+{
+  const Found& found = end.found;
+  double residual = 0;
   settle(operators, structure, interface, end, equilibrium.u);
-  set_pairs(interface, found, equilibrium);
-  equilibrium.history = history_of(interface, found);
-  const double residual = residual_of(interface, end, equilibrium);
+  if (interface.pairs > 0)
+  {
+    set_pairs(operators, interface, found, equilibrium);
+    residual = residual_of(operators, interface, end, equilibrium);
+  }
+  if (!operators.driven) equilibrium.history = history_of(interface, found);
+  if (operators.driven && operators.held.kappa == 0)
+    equilibrium.uniqueness = found.unique || interface.pairs == 0 ? Uniqueness::assured : Uniqueness::not_assured;
   const bool good = balances(structure, interface, equilibrium) && residual <= 1e-9;
   equilibrium.outcome = {good ? OutcomeKind::converged : OutcomeKind::not_converged,
                          good ? "" : "the statuses were found, but rounding leaves residuals above 1e-9",
                          found.iterations, residual};
+}
+
+} // namespace
+
+Equilibrium find_by_path(const PathOperators& operators, const Structure& structure, const Interface& interface,
+                         const PathStart& start)
+{
+  const MPI_Comm comm = comm_of(structure.load);
+  EndOfPath end;
+  Found& found = end.found;
+  found.completed = 1;
+  if (interface.pairs > 0)
+  {
+    const std::vector<PathEnd> ends = ends_of(operators, structure, interface);
+    on_rank_zero(comm,
+                 [&]
+                 {
+                   try
+                   {
+                     walk_to_end(operators, interface, ends, start, end);
+                   }
+                   catch (const Interrupted&)
+                   {
+                     found.stopped = 1;
+                   }
+                 });
+    share(found, comm);
+    if (found.stopped) join_parts(comm); // which throws
+  }
+  Equilibrium equilibrium;
+  equilibrium.u = zeros_like(structure.load);
+  equilibrium.directions = interface.directions;
+  equilibrium.auxiliary_stiffness = operators.held.kappa;
+  if (found.completed)
+  {
+    settle_and_check(operators, structure, interface, end, equilibrium);
+    return equilibrium;
+  }
+  equilibrium.outcome = failure(operators, interface, found);
+  equilibrium.closed.assign(interface.gap.size(), 0);
+  equilibrium.reactions.assign(interface.size(), 0.);
+  equilibrium.gaps.assign(interface.gap.size(), 0.);
   return equilibrium;
 }
 

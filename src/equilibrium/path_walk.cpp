@@ -210,6 +210,17 @@ PathWalk hold_at(const PathProblem& problem, const StickSlipState& from)
   return walk;
 }
 
+PathWalk rest_of(const PathProblem& problem, const std::vector<char>& expected)
+{
+  PathWalk walk = unloaded(problem);
+  walk.q = load_at(problem, {0, 1}) + problem.of.N * walk.offset;
+  walk.state.w.setZero(); // all closed
+  for (Index i = 0; expected.size() == problem.gap.size() && i < walk.q.size(); ++i)
+    if (!expected[static_cast<std::size_t>(i)]) walk.state.w[i] = problem.of.motion(walk.q);
+  walk.completed = advance_to(problem, {0, 1}, 1, std::numeric_limits<double>::infinity(), walk) == Advance::done;
+  return walk;
+}
+
 PathWalk walk_path(const PathProblem& problem)
 {
   if (has_no_scale(problem))

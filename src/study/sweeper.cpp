@@ -1,7 +1,6 @@
 #include "sweeper.hpp"
 
 #include "following.hpp"
-#include "squeal/algebra/lent_cores.hpp"
 #include "squeal/base/cost.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
@@ -381,7 +380,6 @@ private:
 
 std::vector<Sweep> visit(const SweepProblem& problem, MPI_Comm comm, const std::vector<SweepLine>& lines)
 {
-  const Finally alone = one_thread(); // points are many dense problems of a few hundred rows
   return Sweeper(problem, comm).run(lines);
 }
 

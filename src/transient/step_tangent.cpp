@@ -3,7 +3,6 @@
 /// and A dv+ is the right-hand side just solved for, as in the step itself.
 #include "squeal/transient/step_tangent.hpp"
 
-#include "squeal/algebra/lent_cores.hpp"
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/free_memory.hpp"
@@ -154,7 +153,7 @@ MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> column
     const LeadingFactor& factor = factor_of(contact, record, room, fresh);
     dr = contact.reactions(contact.solve(factor, contact.rows_of(db))) + of_coefficient * dmu;
   };
-  on_rank_zero_with_lent_cores(comm_of(interface.B), interface.size(), find);
+  on_rank_zero(comm_of(interface.B), find);
   MPI_Bcast(dr.data(), to_int(dr.size()), MPI_DOUBLE, 0, comm_of(interface.B));
   return dr;
 }

@@ -326,7 +326,8 @@ void multiply_mass_and_stiffness(const ThetaStep& step, const Structure& structu
                                  const std::array<std::span<const Vec>, 2>& of,
                                  const std::array<std::span<const Vec>, 2>& to)
 {
-  if (step.matrices) return multiply_both(*step.matrices, of[0], of[1], to[0], to[1]);
+  if (step.matrices && of[0].size() == 1)
+    return multiply_both(*step.matrices, {of[0][0], of[1][0]}, {to[0][0], to[1][0]});
   product(structure.M, of[0], to[0]);
   product(structure.K, of[1], to[1]);
 }

@@ -2,7 +2,7 @@
 // Where contact solvers fail: the fixed point beyond rho = 2/lambda_max(W), both at large friction and on
 // ill-conditioned W; what is not solved must say so.
 #include "../support/contact_problem.hpp"
-#include "squeal/contact/complementarity.hpp"
+#include "squeal/equilibrium/path_walk.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -182,28 +182,28 @@ TEST_CASE("one equilibrium is promised only where there is one")
   int promised = 0, several = 0, none = 0;
   for (int trial = 0; trial < 400; ++trial)
   {
-    const std::size_t n = 4;
-    ComplementarityProblem problem;
-    Vector M = random_compliance(4, 1, 20, 0, random);
-    for (double& entry : M) entry += (trial % 4) * 0.3 * uniform(random); // friction couples without symmetry
-    problem.M = Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(M.data());
-    problem.compliance = 1;
-    for (std::size_t i = 0; i < n; ++i) problem.q.push_back(uniform(random));
+    constexpr Eigen::Index n = 4;
+    Vector entries = random_compliance(4, 1, 20, 0, random);
+    for (double& entry : entries) entry += (trial % 4) * 0.3 * uniform(random); // friction couples without symmetry
+    const Eigen::MatrixXd M = Eigen::Map<Eigen::Matrix<double, n, n, Eigen::RowMajor>>(entries.data());
+    Eigen::VectorXd q(n);
+    for (double& gap : q) gap = uniform(random);
     int solutions = 0;
-    for (std::size_t bits = 0; bits < 16; ++bits)
+    for (int bits = 0; bits < 16; ++bits)
     {
-      std::vector<char> closed(n);
-      for (std::size_t i = 0; i < n; ++i) closed[i] = (bits >> i) & 1;
-      const SplitSolution split = SplitSolver(problem, closed).solve(problem.q);
-      const double least = std::min(*std::min_element(split.gap.begin(), split.gap.end()),
-                                    *std::min_element(split.reaction.begin(), split.reaction.end()));
-      solutions += least >= 0 && split.defect < 1e-9 ? 1 : 0;
+      Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n, n);
+      for (int i = 0; i < n; ++i)
+        if ((bits >> i) & 1) system.col(i) = -M.col(i);
+      solutions += system.fullPivLu().solve(q).minCoeff() >= 0 ? 1 : 0;
     }
-    if (has_one_solution(problem))
+    const StickSlipOperator of =
+        make_stick_slip_operator(Eigen::MatrixXd::Identity(n, n), M, M.diagonal().cwiseAbs(), 0, {0, 0, 0, 0});
+    if (has_one_solution(of))
     {
       ++promised;
       CHECK(solutions == 1);
-      CHECK(solve_by_status(problem, std::vector<char>(n, 0), 100).outcome == StatusOutcome::converged);
+      const Vector nothing(n, 0.);
+      CHECK(rest_of({of, 0, nothing, {nothing, {}}, {{"load", q, 1}}}, {}).completed);
     }
     several += solutions > 1 ? 1 : 0;
     none += solutions == 0 ? 1 : 0;

@@ -34,7 +34,7 @@ struct Planar
     N = (N.array().abs() < 1e-13).select(0, N);
     std::vector<int> contact(mu.size());
     std::iota(contact.begin(), contact.end(), 0);
-    of = make_stick_slip_operator(N, D, 1, contact);
+    of = make_stick_slip_operator(N, D, D.diagonal(), 1, contact);
   }
 
   MatrixXd held() const { return K + kappa * B.transpose() * B; }
@@ -317,7 +317,7 @@ struct Spheres
             square(a[0] - b[0], a[1] - b[1], size / 2) / (M_PI * G * size * size); // of both bodies
       }
     for (const auto& [x, y] : at) gap.push_back((x * x + y * y) / (2 * R));
-    of = make_stick_slip_operator(MatrixXd::Identity(2 * pairs, 2 * pairs), D, 1,
+    of = make_stick_slip_operator(MatrixXd::Identity(2 * pairs, 2 * pairs), D, D.diagonal(), 1,
                                   std::vector<int>(static_cast<std::size_t>(pairs), 0));
     move(0);
   }
@@ -424,6 +424,7 @@ TEST_CASE("pairs that stick leave the unknowns where reactions stand alone, and 
     CHECK(distance(near.r, own.r) < 1e-10); // rounding: another order of elimination
     CHECK(distance(near.w, own.w) < 1e-10);
   }
-  StickSlipOperator twice = make_stick_slip_operator(MatrixXd::Identity(4, 4), MatrixXd::Ones(4, 4), 1, {0, 0});
+  StickSlipOperator twice =
+      make_stick_slip_operator(MatrixXd::Identity(4, 4), MatrixXd::Ones(4, 4), VectorXd::Ones(4), 1, {0, 0});
   CHECK_FALSE(divided(twice)); // rows that depend on each other: as they are
 }

@@ -1,6 +1,6 @@
 #pragma once
-/// M and K, symmetric, stored together (src/README.md, section 8.5). One pass gives the products of both, for several
-/// trajectories at once. Of the columns that a rank owns the upper triangle is stored, of others each entry.
+/// M and K, symmetric, stored together (src/README.md, section 8.5). One pass gives the products of both. Of the
+/// columns that a rank owns the upper triangle is stored, of others each entry.
 #include "squeal/base/petsc.hpp"
 
 #include <array>
@@ -32,8 +32,7 @@ struct PairedMatrices
 /// Nothing unless M and K are sparse. Collective.
 std::optional<PairedMatrices> pair_matrices(Mat M, Mat K);
 
-/// Mv = M v and Ku = K u of each. Collective.
-void multiply_both(const PairedMatrices& matrices, std::span<const Vec> v, std::span<const Vec> u,
-                   std::span<const Vec> Mv, std::span<const Vec> Ku);
+/// `to` = (M v, K u) of `of` = (v, u). Collective.
+void multiply_both(const PairedMatrices& matrices, const std::array<Vec, 2>& of, const std::array<Vec, 2>& to);
 
 } // namespace squeal

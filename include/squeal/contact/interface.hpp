@@ -95,13 +95,6 @@ bool has_undriven_pairs(const Interface& interface);
 /// r_t = mu(|v_d|) r_n e.
 std::vector<double> drive_directions(const Interface& interface);
 
-/// The same, and the first tangent of a pair without drive: where friction at rest may act.
-std::vector<double> sliding_axes(const Interface& interface);
-
-/// The rows of B that steady sliding needs, normal and along one axis of each pair: an operator of one direction,
-/// without gaps, drive, or anything else. Collective.
-Interface along(const Interface& interface, const std::vector<double>& axes);
-
 /// mu(|v_d|) of every pair.
 std::vector<double> drive_friction(const Interface& interface);
 

@@ -4,6 +4,7 @@
 ///     N w = q + M r,   w: gaps, with the approach of the pairs' compliance, and slips of the increment,
 ///     0 <= w_n _|_ r_n >= 0;   undriven: |r_t| <= mu r_n, r_t = -mu r_n w_t/|w_t| where w_t is not 0;
 ///     driven: r_t = mu r_n e.
+/// Where all pairs are driven, rows are normal ones alone: M then holds the friction.
 /// Semismooth Newton on the statuses. A status leaves each pair as many unknowns as it has rows, and a linear system.
 /// Where M can be divided by, r = M^-1 N w - M^-1 q: pairs that stick have w = 0 and leave the system, which a joint of
 /// thousands that mostly stick would fill.
@@ -23,7 +24,7 @@ struct StickSlipOperator
   Eigen::MatrixXd N, M; // rows x rows; M empty: identity
   int directions = 1;
   std::vector<NaturalScale> rho; // [N/m] of each pair, by its own block of M
-  double compliance = 0;         // [m/N] the largest diagonal entry of M
+  double compliance = 0;         // [m/N] the largest of a row
   std::vector<int> contact;      // number of each pair's: reactions are judged by the largest of their contact
 
   Eigen::VectorXd times_M(const Eigen::VectorXd& r) const { return M.size() > 0 ? Eigen::VectorXd(M * r) : r; }
@@ -38,9 +39,9 @@ struct StickSlipOperator
   double least_force(const Eigen::VectorXd& q) const { return 1e-6 * motion(q) / compliance; }
 };
 
-/// `contact`: as above.
-StickSlipOperator make_stick_slip_operator(Eigen::MatrixXd N, Eigen::MatrixXd M, int directions,
-                                           std::vector<int> contact);
+/// `own`: compliance of each row to its own force without friction [m/N]; `contact`: as above.
+StickSlipOperator make_stick_slip_operator(Eigen::MatrixXd N, Eigen::MatrixXd M, const Eigen::VectorXd& own,
+                                           int directions, std::vector<int> contact);
 
 /// The operator with N and q divided by M.
 struct DividedOperator

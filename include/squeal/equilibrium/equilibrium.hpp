@@ -77,9 +77,8 @@ struct EquilibriumOptions
 
 struct PathOperators;
 
-/// Equilibria of models of one layout, one after the other. The stiffness factored and the compliance D of the pairs,
-/// on their normals and the axes they slide along, are kept while the models share K and B and have these axes.
-/// Neither load nor friction changes them.
+/// Equilibria of models of one layout, one after the other. The stiffness factored and the compliance D of the pairs
+/// are kept while the models share K and B. Neither load, friction nor drive changes them.
 class Equilibria
 {
 public:
@@ -99,15 +98,12 @@ public:
   void expect(const std::vector<char>& closed) { expected_ = closed; }
   int factors() const { return factors_; } // made so far
 
-  struct Kept;
-
 private:
   const PathOperators& operators_for(const Structure& structure, const Interface& interface);
 
   EquilibriumOptions options_;
-  std::unique_ptr<Kept> kept_;
-  std::unique_ptr<PathOperators> path_kept_; // of structures with undriven pairs
-  std::vector<char> expected_{};             // empty: none are
+  std::unique_ptr<PathOperators> kept_;
+  std::vector<char> expected_{}; // empty: none are
   int factors_ = 0;
 };
 

@@ -55,6 +55,16 @@ PathWalk walk_path(const PathProblem& problem);
 /// are minus the offsets of undriven pairs.
 PathWalk hold_at(const PathProblem& problem, const StickSlipState& from);
 
+/// The state under the whole load of driven pairs alone, whose friction is in M: one increment, from those pairs closed
+/// that are expected. Without a solution `q` is the problem's all the same.
+PathWalk rest_of(const PathProblem& problem, const std::vector<char>& expected);
+
+/// Whether it is proved that no w >= 0 and r >= 0 fulfil N w = q + M r (Farkas), in at most some hundred exchanges.
+bool has_no_solution(const StickSlipOperator& of, const Eigen::VectorXd& q);
+
+/// Whether one solution is sure: N is 1, and the symmetric part of M is positive definite.
+bool has_one_solution(const StickSlipOperator& of);
+
 /// The motion of the rows that the load drives and no forces of closed pairs within their friction resist, where there
 /// is one: no equilibrium exists then, whatever the path. `q`: by the load alone.
 std::optional<Eigen::VectorXd> unresisted_motion(const PathProblem& problem, const StickSlipFriction& friction,
