@@ -1,5 +1,6 @@
 #include "squeal/equilibrium/path_walk.hpp"
 
+#include "pivoting.hpp"
 #include "squeal/base/error.hpp"
 
 #include <algorithm>
@@ -217,7 +218,16 @@ PathWalk rest_of(const PathProblem& problem, const std::vector<char>& expected)
   walk.state.w.setZero(); // all closed
   for (Index i = 0; expected.size() == problem.gap.size() && i < walk.q.size(); ++i)
     if (!expected[static_cast<std::size_t>(i)]) walk.state.w[i] = problem.of.motion(walk.q);
-  walk.completed = advance_to(problem, {0, 1}, 1, std::numeric_limits<double>::infinity(), walk) == Advance::done;
+  const auto rests = [&] {
+    return advance_to(problem, {0, 1}, 1, std::numeric_limits<double>::infinity(), walk) == Advance::done;
+  };
+  walk.completed = rests();
+  if (walk.completed) return walk;
+  if (auto pivoted = rest_by_pivoting(problem.of, walk.q))
+  {
+    walk.state = *std::move(pivoted);
+    walk.completed = rests();
+  }
   return walk;
 }
 

@@ -90,7 +90,7 @@ TEST_CASE("the rest of driven pairs is what trying every set of closed pairs fin
 TEST_CASE("much friction: what is found is one of the solutions, and none is proved away")
 {
   std::mt19937 random(9);
-  int none = 0, several = 0, proved = 0, missed = 0;
+  int none = 0, several = 0, proved = 0;
   for (int trial = 0; trial < 300; ++trial)
   {
     const Rest problem = random_problem(5, 2, random);
@@ -107,12 +107,11 @@ TEST_CASE("much friction: what is found is one of the solutions, and none is pro
     none += truth.empty() ? 1 : 0;
     several += truth.size() > 1 ? 1 : 0;
     proved += impossible ? 1 : 0;
-    missed += !found.completed && !truth.empty() ? 1 : 0;
+    CHECK(found.completed == !truth.empty());
   }
-  MESSAGE(none, " without solution, ", proved, " proved, ", several, " with several, ", missed, " missed");
+  MESSAGE(none, " without solution, ", proved, " proved, ", several, " with several");
   CHECK(std::min(none, several) > 10); // both were met
   CHECK(proved > none / 2);
-  CHECK(missed < 60); // of friction far beyond any brake's
 }
 
 TEST_CASE("friction that pulls every one of many pairs open is proved to have no rest")
