@@ -112,11 +112,10 @@ std::optional<std::vector<char>> closed_by_path(const StickSlipOperator& of, con
 
 std::optional<StickSlipState> rest_by_pivoting(const StickSlipOperator& of, const VectorXd& q)
 {
-  constexpr std::size_t few = 12; // pairs: 4096 sets
   const auto pairs = static_cast<std::size_t>(q.size());
   if (const auto closed = closed_by_path(of, q))
     if (auto found = solution_of(of, q, *closed)) return found;
-  for (std::size_t set = 0; pairs <= few && set < (std::size_t{1} << pairs); ++set)
+  for (std::size_t set = 0; q.size() <= few_pairs && set < (std::size_t{1} << pairs); ++set)
   {
     std::vector<char> closed(pairs);
     for (std::size_t i = 0; i < pairs; ++i) closed[i] = (set >> i) & 1;

@@ -7,7 +7,10 @@
 namespace squeal
 {
 
-/// A solution by Lemke's path, or of few pairs by trying every set of closed ones; none where neither finds one.
+constexpr Eigen::Index few_pairs = 12; // whose 4096 sets take less than the path of a thousand pairs
+
+/// A solution by Lemke's path, or of few pairs by trying every set of closed ones. Of few pairs none means that there
+/// is none; of more that none was found.
 std::optional<StickSlipState> rest_by_pivoting(const StickSlipOperator& of, const Eigen::VectorXd& q);
 
 } // namespace squeal

@@ -90,7 +90,7 @@ TEST_CASE("the rest of driven pairs is what trying every set of closed pairs fin
 TEST_CASE("much friction: what is found is one of the solutions, and none is proved away")
 {
   std::mt19937 random(9);
-  int none = 0, several = 0, proved = 0;
+  int none = 0, several = 0;
   for (int trial = 0; trial < 300; ++trial)
   {
     const Rest problem = random_problem(5, 2, random);
@@ -103,15 +103,13 @@ TEST_CASE("much friction: what is found is one of the solutions, and none is pro
       for (const VectorXd& solution : truth) nearest = std::min(nearest, distance(found.state.r, solution));
       CHECK(nearest < 1e-6);
     }
-    CHECK((!impossible || truth.empty()));
+    CHECK(impossible == truth.empty()); // of few pairs
     none += truth.empty() ? 1 : 0;
     several += truth.size() > 1 ? 1 : 0;
-    proved += impossible ? 1 : 0;
     CHECK(found.completed == !truth.empty());
   }
-  MESSAGE(none, " without solution, ", proved, " proved, ", several, " with several");
+  MESSAGE(none, " without solution, ", several, " with several");
   CHECK(std::min(none, several) > 10); // both were met
-  CHECK(proved > none / 2);
 }
 
 TEST_CASE("friction that pulls every one of many pairs open is proved to have no rest")
