@@ -337,7 +337,7 @@ void write_fields(const Report& report, const Scene& scene, const Model& model, 
   for (std::size_t i = 0; i < 2 * report.sensitivity.modes.size(); ++i)
   {
     copy_column(report.sensitivity.modes[i / 2].left, i % 2, part);
-    fields.write(part, format("modes/%zu/left_%s", i / 2 + 1, i % 2 ? "imaginary" : "real"));
+    fields.write(part, format("modes/%zu/left_%s", i / 2 + 1, i % 2 ? "imaginary" : "real"), "");
   }
   if (has_run(report.motion.settled.outcome))
     write_motion_shapes(fields, report.motion.settled.shapes, model.structure.load);
