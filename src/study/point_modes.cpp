@@ -27,12 +27,9 @@ constexpr Index sketched_sides = 32; // random vectors: their mean square is off
 constexpr double basis_band = 1.1;   // of the real modes, over the band
 constexpr std::size_t fewest = 20;   // real modes
 constexpr double waiting_share =
-    0.02;                          // directions of corrections below this part of the largest wait for the next pass
-constexpr Index mixtures = 24;     // of the residuals of a side: more directions than that wait for the next pass
-constexpr Index small_basis = 120; // shapes: such a problem is solved whole at once
-constexpr double undamped_reach = 1.2; // undamped modes on which a large basis is solved first, over the window
-constexpr double slow = 0.8;           // ratio of errors before and after a correction that did not help
-constexpr int most_passes = 20;        // corrections of the basis; the first one of a brake may need more than 8
+    0.02;                       // directions of corrections below this part of the largest wait for the next pass
+constexpr Index mixtures = 24;  // of the residuals of a side: more directions than that wait for the next pass
+constexpr int most_passes = 20; // corrections of the basis; the first one of a brake may need more than 8
 constexpr double spurious_mode = 1e-8; // backward error of what is no mode
 
 /// The problem at a point on the basis. `kept`: inner products of the shapes without the pivots. `independent`:
@@ -201,13 +198,6 @@ std::vector<TwoSidedPair> inexact(const SolvedPairs& solved, const PointProblem&
   return chosen;
 }
 
-/// How much of the projected problem is solved.
-enum class Extent
-{
-  near_band, // on the undamped modes in and near the band: exact under Rayleigh damping
-  whole,
-};
-
 /// The backward errors of pairs of the projected problem.
 SolvedPairs with_errors(const ModesBasis& modes, const PointMatrices& on_basis, std::vector<TwoSidedPair> pairs)
 {
@@ -245,23 +235,13 @@ void transform(std::vector<TwoSidedPair>& pairs, const MatrixXd& of_right, const
 }
 
 /// The pairs of the projected problem in the window, falling growth rate.
-SolvedPairs solve_projected(const ModesBasis& modes, const PointMatrices& on_basis, const Window& window, Extent extent)
+SolvedPairs solve_projected(const ModesBasis& modes, const PointMatrices& on_basis, const Window& window)
 {
-  const MPI_Comm comm = modes.basis.T.comm;
-  LossyMatrices problem = without_sketch(on_basis, modes.basis.shapes());
-  InvariantSubspaces spaces;
-  if (extent == Extent::near_band)
-  {
-    spaces = invariant_subspaces_shared(comm, problem[0], problem[2], undamped_reach * undamped_reach * window.limit);
-    for (MatrixXd& A : problem)
-      if (A.size() > 0) A = (spaces.left.transpose() * A * spaces.right).eval();
-  }
-  std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(comm, problem, std::sqrt(window.limit));
+  std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(
+      modes.basis.T.comm, without_sketch(on_basis, modes.basis.shapes()), std::sqrt(window.limit));
   std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !window.holds(pair.lambda); });
-  if (extent == Extent::near_band) transform(pairs, spaces.right, spaces.left);
   if (const MatrixXd& V = on_basis.independent; V.size() > 0) transform(pairs, V, V);
-  std::stable_sort(pairs.begin(), pairs.end(),
-                   [](const TwoSidedPair& a, const TwoSidedPair& b) { return a.lambda.real() > b.lambda.real(); });
+  std::ranges::stable_sort(pairs, std::greater{}, [](const TwoSidedPair& pair) { return pair.lambda.real(); });
   return with_errors(modes, on_basis, std::move(pairs));
 }
 
@@ -352,31 +332,16 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
   attach(modes, problem.sliding.interface, point.contact.pairs);
   const double end = two_pi * followed_band * problem.band;
   const Window window{vibration_floor(modes.norms), end * end};
-  Extent extent =
-      problem.tolerance <= modes.whole_up_to || modes.basis.shapes() <= small_basis ? Extent::whole : Extent::near_band;
-  double before = HUGE_VAL;
   for (PetscInt pass = 0;; ++pass)
   {
     problem.end_if_asked();
     const PointMatrices on_basis = matrices_at(modes.basis, point);
-    SolvedPairs solved = solve_projected(modes, on_basis, window, extent);
-    double now = largest_excess(solved, problem);
-    if (extent == Extent::near_band && now > 1 && now > slow * before)
-    {
-      SolvedPairs whole = solve_projected(modes, on_basis, window, Extent::whole);
-      const double of_whole = largest_excess(whole, problem);
-      if (of_whole < slow * now) modes.whole_up_to = problem.tolerance; // the undamped modes leave out more than T does
-      extent = Extent::whole;
-      solved = std::move(whole);
-      now = of_whole;
-    }
-    before = now;
+    SolvedPairs solved = solve_projected(modes, on_basis, window);
     MultiVector residuals{modes.basis.T.comm, MatrixXd(modes.basis.T.entries.rows(), 0)};
     if (pass < most_passes)
       for (const Side side : {Side::right, Side::left})
         append_residuals(modes, point, inexact(solved, problem, side), side, residuals);
     if (correct(modes, std::move(residuals))) continue;
-    if (extent == Extent::near_band && now > 1) solved = solve_projected(modes, on_basis, window, Extent::whole);
     PointModes result = modes_of(solved, problem, on_basis, modes.basis.shapes());
     result.outcome.iterations = static_cast<int>(pass);
     return result;

@@ -18,7 +18,6 @@ struct ModesBasis
 {
   SlidingBasis basis;
   std::vector<char> attached{}; // pairs beyond those closed at every point whose static shapes the basis holds
-  double whole_up_to = 0;       // tolerances for which undamped modes in and near the band were not enough to solve on
   ClosedContact contact{};      // of the pairs that are closed and rigid at every point: without friction
   std::vector<char> closed{};   // those pairs
   Owned<Mat> M_z{}, K_z{};      // with the springs of pairs that have a compliance where the basis was made
