@@ -21,7 +21,8 @@ struct RecordedInverse
 /// From the period that the map recorded last. Integrated once more, it gives the flow.
 void make(CycleProblem& problem, PeriodMap& map, std::shared_ptr<const ReducedModel>& kept, RecordedInverse& inverse)
 {
-  if (!map.recorded_start.get()) return;
+  if (!map.recorded_start.get() || problem.modes.empty()) return;
+  if (!(problem.modes.front().frequency_hz() > 0)) return; // a mode that only diverges is no scale of a basis
   const Owned<Vec> start = copy_of(map.recorded_start.get()), end = copy_of(start.get()), rate = zeros_like(start);
   const double period = map.steps * map.recorded_step;
   flow_of(map).integrate(period, start, end, rate);
