@@ -19,7 +19,7 @@ from squeal.scene import Scene
 
 STUDIES = ("transient", "cycle", "branch", "sweep", "response", "robustness", "uncertain", "change", "initial")
 STEPS = 12  # at most
-MARGIN = 0.8  # of the bar that may be left: the next mesh is aimed a little lower
+MARGIN = 0.9  # the first mesh is aimed at the bar asked for, and each later one lower by this
 UNIFORM = 2**(-1 / 3)  # factor on all sizes of a step of the uniform path: twice the elements
 
 
@@ -152,7 +152,7 @@ def by_sizes(work: Converging) -> Callable[[int, Step], Mesh]:
     """The mesh that the estimate of the step before asks for."""
     def next_mesh(number: int, before: Step) -> Mesh:
         found = estimate(Results(before.folder))
-        left = {mode: MARGIN * part for mode, part in left_open(found, work.part).items()}
+        left = {mode: MARGIN**(number - 1) * part for mode, part in left_open(found, work.part).items()}
         return work.sized(f"sizes_{number}", found, wanted_factors(found, left), "sizes by the estimate")[0]
     return next_mesh
 
@@ -173,7 +173,7 @@ def by_key(work: Converging, key: str, order: int) -> Callable[[int, Step], Mesh
     except SquealError:
         raise SquealError(f"{work.place}: it gives {key} no value that could be raised: write the present one there") from None
     def next_mesh(number: int, before: Step) -> Mesh:
-        factor = min((before.worst / (MARGIN * work.part))**(1 / order), 1.5)
+        factor = min((before.worst / (MARGIN**(number - 1) * work.part))**(1 / order), 1.5)
         value[0] = max(value[0] + 1, int(np.ceil(factor * value[0])))
         return Mesh({key: value[0]}, f"{key} = {value[0]}")
     return next_mesh
