@@ -389,22 +389,19 @@ void find_change_effects(const SensitivityProblem& problem, Sensitivity& result)
 }
 
 /// Keeps the left vector psi of each mode phi, of which the held right one is a multiple, with psi'Q'(lambda) phi = 1.
-void keep_left(const SensitivityProblem& problem, const HeldVectors& vectors, const AtHeldVectors& held,
-               Sensitivity& result)
+void keep_left(const Modes& modes, const HeldVectors& vectors, const AtHeldVectors& held, Sensitivity& result)
 {
   const auto count = static_cast<Eigen::Index>(vectors.count());
   const Eigen::MatrixXd own = inner_products(vectors.right, vectors.right);
-  for (Eigen::Index re = 0, im = count; re < count; ++re, ++im)
+  for (std::size_t mode = 0; mode < vectors.count(); ++mode)
   {
-    const auto mode = static_cast<std::size_t>(re);
-    const std::array shape{problem.modes.modes[mode].real.get(), problem.modes.modes[mode].imaginary.get()};
+    const auto re = static_cast<Eigen::Index>(mode), im = re + count;
+    const std::array shape{modes.modes[mode].real.get(), modes.modes[mode].imaginary.get()};
     const Eigen::MatrixXd phi = inner_products(vectors.right, columns_of(shape));
     const Complex multiple(phi(re, 0) + phi(im, 1), phi(re, 1) - phi(im, 0)),
         factor = (own(re, re) + own(im, im)) / (multiple * held.slopes[mode]);
-    Eigen::MatrixXd turn = Eigen::MatrixXd::Zero(2 * count, 2);
-    turn.row(re) << factor.real(), factor.imag();
-    turn.row(im) << -factor.imag(), factor.real();
-    result.modes[mode].left = combination(vectors.left, turn);
+    const Eigen::Matrix2d turn{{factor.real(), factor.imag()}, {-factor.imag(), factor.real()}};
+    result.modes[mode].left = {vectors.left.comm, vectors.left.entries(Eigen::all, std::array{re, im}) * turn};
   }
 }
 
@@ -417,7 +414,7 @@ Sensitivity find_sensitivity(const SensitivityProblem& problem)
   const HeldVectors vectors = unstable_vectors(problem, result);
   if (vectors.count() == 0) return result;
   const AtHeldVectors held = at_held_vectors(problem.sliding, vectors);
-  keep_left(problem, vectors, held, result);
+  keep_left(problem.modes, vectors, held, result);
   find_powers(problem.sliding, vectors, held, result);
   find_shares(problem, vectors, held, result);
   find_number_derivatives(problem, vectors, held, result);
