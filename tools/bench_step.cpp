@@ -56,9 +56,7 @@ std::pair<double, int> cold_contact(const ThetaStep& step, const PairFriction& f
                                {
                                  std::vector<double> r;
                                  ContactMemory memory;
-                                 const ContactProblem problem{b, r, memory};
-                                 sweeps =
-                                     solve_contacts(step.W, friction, settings, std::span(&problem, 1))[0].iterations;
+                                 sweeps = solve_contact(step.W, friction, settings, {b, r, memory}).iterations;
                                });
   return {taken, sweeps};
 }

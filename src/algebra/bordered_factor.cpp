@@ -176,14 +176,6 @@ std::vector<double> Factor::condensed(double scale) const
   return result;
 }
 
-void Factor::read_condensed(const std::function<void(const CondensedStrip&)>& take) const
-{
-  if (const auto products = condensed_products()) return products->read(take);
-  const std::vector<double> whole = parts_->mumps->take_schur_complement();
-  const auto n = static_cast<std::size_t>(parts_->border);
-  if (parts_->on_rank_zero()) take({0, n, n, whole.data()});
-}
-
 std::optional<CondensedProducts> Factor::condensed_products() const
 {
   if (parts_->cholesky) return CondensedProducts(*parts_);
@@ -193,16 +185,6 @@ std::optional<CondensedProducts> Factor::condensed_products() const
 int CondensedProducts::size() const
 {
   return parts_->border;
-}
-
-double CondensedProducts::entries() const
-{
-  return parts_->cholesky->border_entries();
-}
-
-std::vector<double> CondensedProducts::product(std::span<const double> x, std::size_t columns) const
-{
-  return parts_->cholesky->schur_product(x, columns);
 }
 
 void CondensedProducts::read(const std::function<void(const CondensedStrip&)>& take,

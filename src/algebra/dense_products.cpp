@@ -44,46 +44,6 @@ SQUEAL_INLINE void add_columns(const double* W, std::size_t size, std::size_t j,
   }
 }
 
-/// Products of lanes with `some` columns of W.
-template <class Vector, std::size_t some> SQUEAL_INLINE void
-add_columns_of_lanes(const double* W, std::size_t size, std::size_t j, std::size_t lanes, const double* x, double* y)
-{
-  const double* const first = W + j * size;
-  for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
-  {
-    Vector own_x[some], sums[some] = {}, some_x, some_y;
-    for (std::size_t k = 0; k < some; ++k) get(x + (j + k) * lanes + lane, own_x[k]);
-    for (std::size_t k = 0; k < some; ++k)
-      for (std::size_t i = 0; i < some; ++i) sums[k] += first[std::min(k, i) * size + j + std::max(k, i)] * own_x[i];
-    for (std::size_t i = j + some; i < size; ++i)
-    {
-      get(x + i * lanes + lane, some_x);
-      get(y + i * lanes + lane, some_y);
-      for (std::size_t k = 0; k < some; ++k)
-      {
-        some_y += first[k * size + i] * own_x[k];
-        sums[k] += first[k * size + i] * some_x;
-      }
-      put(some_y, y + i * lanes + lane);
-    }
-    for (std::size_t k = 0; k < some; ++k)
-    {
-      get(y + (j + k) * lanes + lane, some_y);
-      some_y += sums[k];
-      put(some_y, y + (j + k) * lanes + lane);
-    }
-  }
-}
-
-template <class Vector> SQUEAL_INLINE void add_symmetric(const double* W, std::size_t size, std::size_t columns,
-                                                         std::size_t lanes, const double* x, double* y)
-{
-  constexpr std::size_t some = 4; // with their sums and numbers of x they fill the registers
-  std::size_t j = 0;
-  for (; j + some <= columns; j += some) add_columns_of_lanes<Vector, some>(W, size, j, lanes, x, y);
-  for (; j < columns; ++j) add_columns_of_lanes<Vector, 1>(W, size, j, lanes, x, y);
-}
-
 /// y = W x for a few rows, `some`, of a row-major matrix.
 template <class Vector, std::size_t some>
 SQUEAL_INLINE void multiply_rows(const double* W, std::size_t columns, std::size_t lanes, const double* x, double* y)
@@ -132,13 +92,6 @@ SQUEAL_SIMD void add_symmetric_product(const double* W, std::size_t size, std::s
       y[j] += column[i] * x[i];
     }
   }
-}
-
-SQUEAL_SIMD void add_symmetric_product(const double* W, std::size_t size, std::size_t columns, std::size_t lanes,
-                                       const double* x, double* y)
-{
-  with_vector(lanes, [&](auto vector) SQUEAL_INLINE_LAMBDA
-              { add_symmetric<typename decltype(vector)::type>(W, size, columns, lanes, x, y); });
 }
 
 } // namespace squeal

@@ -49,93 +49,47 @@ void add_foreign(const PairedRows& matrices, const Two* x, Two* y)
       y[i] += entry_times(matrices.values[k], x + matrices.columns[k]);
 }
 
-/// Columns of other ranks in this rank's rows, ascending.
-std::vector<PetscInt> foreign_columns(Mat M, Mat K)
+/// Appends row i of two matrices of one pattern, from a column on; whether it has that column.
+bool append_row(const CompressedRows& M, const CompressedRows& K, PetscInt i, PetscInt first, PairedRows& rows)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(M, &first, &last));
-  std::vector<PetscInt> columns;
-  for (Mat A : {M, K})
-    for_each_row(A,
-                 [&](PetscInt, std::span<const PetscInt> of_row, std::span<const PetscScalar>)
-                 {
-                   for (const PetscInt j : of_row)
-                     if (j < first || j >= last) columns.push_back(j);
-                 });
-  std::sort(columns.begin(), columns.end());
-  columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
-  return columns;
-}
-
-/// The exchange that brings these rows of other ranks. Collective.
-Owned<PetscSF> exchange_of(const std::vector<PetscInt>& wanted, Mat A)
-{
-  PetscLayout rows = nullptr;
-  check(MatGetLayouts(A, &rows, nullptr));
-  Owned<PetscSF> exchange;
-  check(PetscSFCreate(comm_of(A), exchange.put()));
-  check(PetscSFSetGraphLayout(exchange, rows, static_cast<PetscInt>(wanted.size()), nullptr, PETSC_COPY_VALUES,
-                              wanted.data()));
-  return exchange;
-}
-
-/// Appends rows of two matrices side by side.
-class RowJoiner
-{
-public:
-  RowJoiner(PairedRows& rows, std::size_t columns) : rows_(rows), place_(columns, 0) {}
-
-  void add(PetscInt column, std::size_t which, double value)
+  const std::size_t before = rows.columns.size();
+  for (PetscInt k = M.starts[i]; k < M.starts[i + 1]; ++k)
   {
-    PetscInt& here = place_[static_cast<std::size_t>(column)]; // one more than where the column's last entry is
-    if (here <= rows_.starts.back())
-    {
-      rows_.columns.push_back(column);
-      rows_.values.push_back({});
-      here = static_cast<PetscInt>(rows_.columns.size());
-    }
-    rows_.values[static_cast<std::size_t>(here) - 1][which] += value;
+    if (M.columns[k] < first) continue;
+    rows.columns.push_back(M.columns[k]);
+    rows.values.push_back({M.values[k], K.values[k]});
   }
+  rows.starts.push_back(static_cast<PetscInt>(rows.columns.size()));
+  return rows.columns.size() > before && rows.columns[before] == first;
+}
 
-  void end_row() { rows_.starts.push_back(static_cast<PetscInt>(rows_.columns.size())); }
-
-private:
-  PairedRows& rows_;
-  std::vector<PetscInt> place_;
-};
+bool have_one_pattern(const CompressedRows& M, const CompressedRows& K)
+{
+  return std::equal(M.starts, M.starts + M.rows + 1, K.starts) &&
+         std::equal(M.columns, M.columns + M.starts[M.rows], K.columns);
+}
 
 } // namespace
 
 std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
 {
   if (!is_sparse(M) || !is_sparse(K)) return std::nullopt;
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(M, &first, &last));
-  const std::vector<PetscInt> others = foreign_columns(M, K);
-  PairedMatrices matrices{comm_of(M), {}, {}, others.size(), exchange_of(others, M)};
-  RowJoiner own(matrices.own, static_cast<std::size_t>(last - first)), foreign(matrices.foreign, others.size());
-  const auto enter = [&](Mat A, PetscInt i, std::size_t which)
+  SplitMatrix of_M = split(M);
+  const SplitMatrix of_K = split(K);
+  PairedMatrices matrices{comm_of(M), {}, {}, static_cast<std::size_t>(of_M.received), {}};
+  int alike = 1; // on all ranks
+  const auto join = [&](Mat left, Mat right, PairedRows& rows, bool upper)
   {
-    PetscInt count = 0;
-    const PetscInt* columns = nullptr;
-    const PetscScalar* values = nullptr;
-    check(MatGetRow(A, i, &count, &columns, &values));
-    for (PetscInt k = 0; k < count; ++k)
-      if (columns[k] < first || columns[k] >= last)
-        foreign.add(static_cast<PetscInt>(std::lower_bound(others.begin(), others.end(), columns[k]) - others.begin()),
-                    which, values[k]);
-      else if (columns[k] >= i)
-        own.add(columns[k] - first, which, values[k]);
-    check(MatRestoreRow(A, i, &count, &columns, &values));
+    const CompressedRows m(left), k(right);
+    alike = alike && have_one_pattern(m, k);
+    for (PetscInt i = 0; alike && i < m.rows; ++i)
+      alike = append_row(m, k, i, upper ? i : 0, rows) || !upper; // a row begins with its diagonal entry
   };
-  for (PetscInt i = first; i < last; ++i)
-  {
-    own.add(i - first, 0, 0.); // a row begins with its diagonal entry, be it zero
-    enter(M, i, 0);
-    enter(K, i, 1);
-    own.end_row();
-    foreign.end_row();
-  }
+  join(of_M.own, of_K.own, matrices.own, true);
+  if (of_M.foreign) join(of_M.foreign, of_K.foreign, matrices.foreign, false);
+  MPI_Allreduce(MPI_IN_PLACE, &alike, 1, MPI_INT, MPI_LAND, matrices.comm);
+  if (!alike) return std::nullopt;
+  matrices.exchange = std::move(of_M.exchange);
   return matrices;
 }
 

@@ -1,4 +1,4 @@
-/// Parts of the Schur complement E E' of a bordered factor, and products with it, from the rows of E that the factor
+/// Parts of the Schur complement E E' of a bordered factor, from the rows of E that the factor
 /// holds. Nothing of its size is stored. Each rank adds up what its own subtrees give and, of shared supernodes, what
 /// its border rows give.
 #include "cholesky.hpp"
@@ -139,25 +139,6 @@ void gather(const DenseRows& own, const std::vector<int>& border, std::size_t pi
   }
 }
 
-/// own -= E' x; x has the border's rows.
-void subtract_transposed_rows(const BorderRows& E, std::size_t lanes, const double* x, double* own,
-                              std::vector<double>& part)
-{
-  part.assign((E.panel.rows + tile) * lanes, 0.);
-  for (std::size_t i = 0; i < E.rows(); ++i)
-    std::copy_n(x + E.row(i) * lanes, lanes, part.data() + (E.before + i) * lanes);
-  subtract_transposed(E.panel, lanes, part.data(), own);
-}
-
-/// y -= E times `own`; y has the border's rows.
-void subtract_rows(const BorderRows& E, std::size_t lanes, const double* own, double* y, std::vector<double>& part)
-{
-  part.assign((E.panel.rows + tile) * lanes, 0.);
-  subtract_product(E.panel, lanes, own, part.data());
-  for (std::size_t i = 0; i < E.rows(); ++i)
-    for (std::size_t l = 0; l < lanes; ++l) y[E.row(i) * lanes + l] += part[(E.before + i) * lanes + l];
-}
-
 /// Adds the parts of all ranks on one of them, in messages of moderate length. Collective.
 void sum_on(int rank, std::vector<double>& part, MPI_Comm comm)
 {
@@ -202,55 +183,6 @@ void Cholesky::read_schur_complement(std::span<const WantedColumns> strips,
     sum_on(rank, values, comm_);
     if (rank_of(comm_) == rank) take({begin, end, height, values.data()});
   }
-}
-
-std::vector<double> Cholesky::schur_product(std::span<const double> x, std::size_t columns) const
-{
-  const std::size_t border = at(share_.symbolic.border), lanes = lanes_for(columns), own = share_.own;
-  std::vector<double> from(border * lanes, 0.), to(border * lanes, 0.), part;
-  if (rank_of(comm_) == 0)
-    for (std::size_t k = 0; k < columns; ++k)
-      for (std::size_t i = 0; i < border; ++i) from[i * lanes + k] = x[k * border + i];
-  if (ranks_of(comm_) > 1) MPI_Bcast(from.data(), to_int(from.size()), MPI_DOUBLE, 0, comm_);
-  std::vector<BorderRows> shared;
-  std::vector<double> of_shared, pivots;
-  for (std::size_t k = own; k < share_.symbolic.supernodes.size(); ++k)
-  {
-    shared.push_back(border_rows(share_, k, values_));
-    const std::size_t begin = of_shared.size();
-    of_shared.resize(begin + shared.back().pivots() * lanes, 0.);
-    subtract_transposed_rows(shared.back(), lanes, from.data(), of_shared.data() + begin, part);
-  }
-  if (!shared.empty())
-    MPI_Allreduce(MPI_IN_PLACE, of_shared.data(), to_int(of_shared.size()), MPI_DOUBLE, MPI_SUM, comm_);
-  for (std::size_t begin = 0; const BorderRows& E : shared)
-  {
-    subtract_rows(E, lanes, of_shared.data() + begin, to.data(), part);
-    begin += E.pivots() * lanes;
-  }
-  for (std::size_t k = 0; k < own; ++k)
-  {
-    const BorderRows E = border_rows(share_, k, values_);
-    if (E.rows() == 0) continue;
-    pivots.assign(E.pivots() * lanes, 0.);
-    subtract_transposed_rows(E, lanes, from.data(), pivots.data(), part);
-    subtract_rows(E, lanes, pivots.data(), to.data(), part);
-  }
-  std::vector<double> result(border * columns);
-  for (std::size_t k = 0; k < columns; ++k)
-    for (std::size_t i = 0; i < border; ++i) result[k * border + i] = to[i * lanes + k];
-  sum_on(0, result, comm_);
-  if (rank_of(comm_) != 0) result.clear();
-  return result;
-}
-
-double Cholesky::border_entries() const
-{
-  double entries = 0;
-  for (const Supernode& supernode : share_.symbolic.supernodes)
-    entries += static_cast<double>(supernode.columns) * supernode.border;
-  MPI_Allreduce(MPI_IN_PLACE, &entries, 1, MPI_DOUBLE, MPI_SUM, comm_);
-  return entries;
 }
 
 } // namespace squeal

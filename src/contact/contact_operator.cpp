@@ -57,24 +57,11 @@ SQUEAL_SIMD void add_rows(const float* rows, std::size_t length, std::size_t num
   add_block(rows, length, number, factors, target);
 }
 
-void ContactOperator::multiply(std::span<const std::span<const double>> x, std::span<const std::span<double>> y) const
+void ContactOperator::multiply(std::span<const double> x, std::span<double> y) const
 {
-  const std::size_t n = size(), lanes = lanes_for(x.size());
-  if (x.empty()) return;
-  if (products_)
-  {
-    std::vector<double> all;
-    for (const std::span<const double> column : x) all.insert(all.end(), column.begin(), column.end());
-    const std::vector<double> result = multiply_by_factor(all, x.size());
-    for (std::size_t k = 0; k < y.size(); ++k) std::copy_n(result.data() + k * n, n, y[k].data());
-    return;
-  }
-  std::vector<double> from(n * lanes), to(n * lanes);
-  for (std::size_t k = 0; k < x.size(); ++k)
-    for (std::size_t i = 0; i < n; ++i) from[i * lanes + k] = x[k][i];
-  multiply_lanes(x.size(), from, to);
-  for (std::size_t k = 0; k < y.size(); ++k)
-    for (std::size_t i = 0; i < n; ++i) y[k][i] = to[i * lanes + k];
+  std::vector<double> from(x.begin(), x.end()), to(x.size());
+  multiply_stored(from, to);
+  std::ranges::copy(to, y.begin());
 }
 
 void ContactOperator::add_product(std::size_t pair, const PairVector& change, std::span<double> w) const
@@ -117,9 +104,7 @@ double ContactOperator::largest_eigenvalue(std::span<const double> roots, int it
     if (length == 0) break;
     for (double& entry : x) entry /= length;
     std::ranges::transform(x, roots, scaled.begin(), std::multiplies<>());
-    const std::span<const double> in = scaled;
-    const std::span<double> out = y;
-    multiply(std::span(&in, 1), std::span(&out, 1));
+    multiply(scaled, y);
     std::ranges::transform(y, roots, y.begin(), std::multiplies<>());
     largest = dot(x, y);
     std::swap(x, y);
@@ -167,18 +152,10 @@ ContactOperator make_contact_operator(std::vector<double> W, int pairs, int dire
   return op;
 }
 
-bool stays_in_factor(double rows, double border_entries, double free)
-{
-  const double half = rows * rows / 2; // of a symmetric W, which a product reads; or E twice
-  return 2 * border_entries < half || sizeof(double) * 2 * half > free / 4;
-}
-
-ContactOperator make_contact_operator(const ScaledProducts& W, OperatorStorage storage, int pairs, int directions,
-                                      MPI_Comm comm)
+ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int directions, MPI_Comm comm)
 {
   ContactOperator op;
-  const bool by_factor = storage == OperatorStorage::by_factor;
-  NearFieldBuilder builder(static_cast<std::size_t>(pairs), directions, by_factor ? PETSC_COMM_SELF : comm);
+  NearFieldBuilder builder(static_cast<std::size_t>(pairs), directions, comm);
   std::vector<double> values;
   const auto scaled = [&](const CondensedStrip& strip)
   {
@@ -188,38 +165,25 @@ ContactOperator make_contact_operator(const ScaledProducts& W, OperatorStorage s
       values[(j - strip.first) * (strip.height + 1)] += W.diagonal[j];
     return CondensedStrip{strip.first, strip.last, strip.height, values.data()};
   };
-  const bool first = rank_of(comm) == 0;
-  if (by_factor)
-  {
-    op.products_ = W;
-    if (ranks_of(comm) > 1) op.shared_by_ = comm;
-    W.products.read([&](const CondensedStrip& strip) { builder.measure(scaled(strip)); });
-    if (first) builder.agree();
-    W.products.read([&](const CondensedStrip& strip) { builder.collect(scaled(strip)); });
-    if (first) op.near_ = builder.finish();
-  }
-  else
-  {
-    const std::size_t rows = PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs));
-    W.products.read(
-        [&](const CondensedStrip& strip)
-        {
-          const CondensedStrip now = scaled(strip);
-          builder.measure(now);
-          op.append_strips(now);
-        },
-        op.share_columns(rows, comm));
-    builder.agree();
-    op.for_each_strip([&](const CondensedStrip& strip) { builder.collect(strip); });
-    op.near_ = builder.finish();
-  }
-  if (first)
+  const std::size_t rows = PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs));
+  W.products.read(
+      [&](const CondensedStrip& strip)
+      {
+        const CondensedStrip now = scaled(strip);
+        builder.measure(now);
+        op.append_strips(now);
+      },
+      op.share_columns(rows, comm));
+  builder.agree();
+  op.for_each_strip([&](const CondensedStrip& strip) { builder.collect(strip); });
+  op.near_ = builder.finish();
+  if (rank_of(comm) == 0)
   {
     op.pairs_ = static_cast<std::size_t>(pairs);
     op.directions_ = directions;
     op.set_diagonal(builder.diagonal());
   }
-  if (op.shared_by_ != MPI_COMM_NULL) op.share_patches();
+  op.share_patches();
   return op;
 }
 

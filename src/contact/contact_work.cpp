@@ -36,19 +36,11 @@ double residual_of(const ContactWork& work)
   return residual;
 }
 
-void form_products(std::span<ContactWork* const> works)
+void form_product(ContactWork& work)
 {
-  if (works.empty()) return;
-  std::vector<std::span<const double>> r;
-  std::vector<std::span<double>> Wr;
-  for (ContactWork* work : works)
-  {
-    work->Wr.resize(work->r.size());
-    r.emplace_back(work->r);
-    Wr.emplace_back(work->Wr);
-    ++work->reads;
-  }
-  works.front()->W.multiply(r, Wr);
+  work.Wr.resize(work.r.size());
+  ++work.reads;
+  work.W.multiply(work.r, work.Wr);
 }
 
 namespace

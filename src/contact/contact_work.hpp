@@ -49,7 +49,7 @@ double residual_of(const ContactWork& work);
 /// Returns the laws that rank 0 gives. Collective.
 PairFriction announced_friction(PairFriction friction, MPI_Comm comm);
 
-/// W r of each, reading W once.
-void form_products(std::span<ContactWork* const> works);
+/// Forms W r.
+void form_product(ContactWork& work);
 
 } // namespace squeal

@@ -1,5 +1,4 @@
-/// Block Gauss-Seidel for problems that share W. Sweeps are the outer loop, pairs the next, problems the inner one. So
-/// a pair's rows are read once for all the problems in which it moves.
+/// Block Gauss-Seidel.
 ///
 /// Let w = w_0 + dw with w_0 = W r_0 + b from the last product with W, and dw the effect of the changes since. The
 /// sweeps update dw alone. It is small, so the near field and single precision suffice, patch by patch where there are
@@ -43,8 +42,6 @@ template <class Entry> struct SweptProblem
   int failures = 0; // products with W in succession that did not halve the residual after finished sweeps
 };
 
-template <class Entry> using Problems = std::vector<SweptProblem<Entry>*>;
-
 template <class Entry> PairVector velocity_of(const SweptProblem<Entry>& problem, std::size_t pair)
 {
   PairVector w = problem.work.velocity(pair);
@@ -86,10 +83,9 @@ template <class Entry> double visit(SweptProblem<Entry>& problem, std::size_t pa
 }
 
 /// Gives every rank the reactions of all patches of a turn.
-template <class Entry> void exchange_reactions(const Problems<Entry>& problems, const Turn& turn, MPI_Comm comm)
+void exchange_reactions(std::vector<double>& r, int directions, const Turn& turn, MPI_Comm comm)
 {
-  const int directions = problems.front()->work.W.directions();
-  const std::size_t of_a_pair = problems.size() * PairRows<std::size_t>(directions).per_pair();
+  const std::size_t of_a_pair = PairRows<std::size_t>(directions).per_pair();
   std::vector<int> counts, starts;
   int total = 0;
   for (const int pairs : turn.counts)
@@ -99,40 +95,33 @@ template <class Entry> void exchange_reactions(const Problems<Entry>& problems, 
     total += counts.back();
   }
   std::vector<double> all(static_cast<std::size_t>(total));
-  const auto for_each_entry = [&](const Turn::Part& part, auto take)
-  {
-    double* entry = all.data() + part.first * of_a_pair;
-    for (const std::size_t pair : turn.pairs(part))
-      for (SweptProblem<Entry>* problem : problems)
-        for (double& reaction : PairView<double>(problem->work.r, directions).of(pair)) take(reaction, *entry++);
-  };
+  const PairView<double> reactions(r, directions), entries(all, directions);
   for (const Turn::Part& part : turn.own)
-    for_each_entry(part, [](double reaction, double& entry) { entry = reaction; });
+    for (std::size_t place = part.first; place < part.first + part.count; ++place)
+      entries.set(place, reactions.vector(turn.order[place]));
   MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, all.data(), counts.data(), starts.data(), MPI_DOUBLE, comm);
-  for_each_entry({0, turn.order.size()}, [](double& reaction, double entry) { reaction = entry; });
+  for (std::size_t place = 0; place < turn.order.size(); ++place)
+    reactions.set(turn.order[place], entries.vector(place));
 }
 
 /// What the reactions of a turn that changed since the last time add to dw from patch to patch.
-void act_on_other_patches(const Problems<float>& problems, const SweptPairs& where, const Turn& turn)
+void act_on_other_patches(SweptProblem<float>& problem, const SweptPairs& where, const Turn& turn)
 {
   if (!where.several) return;
-  if (where.shared()) exchange_reactions(problems, turn, where.comm);
-  for (SweptProblem<float>* problem : problems)
+  const ContactWork& work = problem.work;
+  if (where.shared()) exchange_reactions(work.r, work.W.directions(), turn, where.comm);
+  const PairView<double> known(problem.known, work.W.directions());
+  for (const std::size_t pair : turn.order)
   {
-    const ContactWork& work = problem->work;
-    const PairView<double> known(problem->known, work.W.directions());
-    for (const std::size_t pair : turn.order)
-    {
-      const PairVector now = work.reaction(pair), before = known.vector(pair);
-      if (now == before) continue;
-      work.W.add_product_beyond_patch(pair, {now[0] - before[0], now[1] - before[1], now[2] - before[2]}, problem->dw);
-      known.set(pair, now);
-    }
+    const PairVector now = work.reaction(pair), before = known.vector(pair);
+    if (now == before) continue;
+    work.W.add_product_beyond_patch(pair, {now[0] - before[0], now[1] - before[1], now[2] - before[2]}, problem.dw);
+    known.set(pair, now);
   }
 }
 
 /// The near field alone has patches.
-void act_on_other_patches(const Problems<double>&, const SweptPairs&, const Turn&) {}
+void act_on_other_patches(SweptProblem<double>&, const SweptPairs&, const Turn&) {}
 
 /// The residual by dw, whose rounding it contains, in the pairs of this rank.
 template <class Entry> double estimated_residual(const SweptProblem<Entry>& problem, const SweptPairs& where)
@@ -179,208 +168,153 @@ template <class Entry> void shorten_changes(SweptProblem<Entry>& problem)
   problem.residual_before = residual;
 }
 
-/// What sweeps did to a problem, the most of all patches.
+/// What sweeps did, the most of all patches.
 struct Swept
 {
   double residual = 0; // estimated
   double sweeps = 0;   // that changed reactions
 };
 
-/// Sweeps over one patch, at most so often for each problem, until the defects are small beside the first ones.
-template <class Entry> void sweep_patch(const Problems<Entry>& problems, std::span<const std::size_t> patch,
-                                        const std::vector<int>& at_most, const std::vector<Scales>& largest,
-                                        std::vector<Swept>& swept)
+/// Sweeps over one patch, at most so often, until the defects are small beside the first ones.
+template <class Entry> void sweep_patch(SweptProblem<Entry>& problem, std::span<const std::size_t> patch, int at_most,
+                                        const Scales& largest, Swept& swept)
 {
-  std::vector<double> at_first(problems.size(), 0);
-  std::vector<char> going(problems.size(), 1);
-  for (int sweep = 0; std::find(going.begin(), going.end(), 1) != going.end(); ++sweep)
+  double at_first = 0, defect = 0;
+  for (int sweep = 0; sweep < at_most && (sweep == 0 || defect > small_in_a_patch * at_first); ++sweep)
   {
-    std::vector<double> defects(problems.size(), 0);
-    for (const std::size_t pair : patch)
-      for (std::size_t k = 0; k < problems.size(); ++k)
-        if (going[k]) defects[k] = std::max(defects[k], visit(*problems[k], pair, problems[k]->target / 8, largest[k]));
-    if (sweep == 0) at_first = defects;
-    for (std::size_t k = 0; k < problems.size(); ++k)
-    {
-      if (defects[k] > 0) swept[k].sweeps = std::max(swept[k].sweeps, sweep + 1.);
-      going[k] = going[k] && sweep + 1 < at_most[k] && defects[k] > small_in_a_patch * at_first[k];
-    }
+    defect = 0;
+    for (const std::size_t pair : patch) defect = std::max(defect, visit(problem, pair, problem.target / 8, largest));
+    if (sweep == 0) at_first = defect;
+    if (defect > 0) swept.sweeps = std::max(swept.sweeps, sweep + 1.);
   }
 }
 
 /// The most of all ranks.
-void agree(std::vector<Swept>& swept, const SweptPairs& where)
+void agree(Swept& swept, const SweptPairs& where)
 {
-  if (where.shared())
-    MPI_Allreduce(MPI_IN_PLACE, swept.data(), to_int(2 * swept.size()), MPI_DOUBLE, MPI_MAX, where.comm);
+  if (where.shared()) MPI_Allreduce(MPI_IN_PLACE, &swept, 2, MPI_DOUBLE, MPI_MAX, where.comm);
 }
 
-/// Sweeps over all patches; problems that are finished, or due for a product with W, leave the list.
+/// Sweeps over all patches. Returns whether to sweep on before a product with W.
 template <class Entry>
-void sweep_once(Problems<Entry>& sweeping, const SweptPairs& where, const ContactSettings& settings)
+bool sweep_once(SweptProblem<Entry>& problem, const SweptPairs& where, const ContactSettings& settings)
 {
-  std::vector<Scales> largest;
-  std::vector<int> at_most;
-  for (const SweptProblem<Entry>* problem : sweeping)
-  {
-    largest.push_back(largest_reactions(problem->work));
-    const int left = static_cast<int>(settings.max_iterations) - problem->work.result.iterations;
-    at_most.push_back(where.several && !where.by_pieces() ? std::min(most_of_a_patch, left) : 1);
-  }
-  std::vector<Swept> swept(sweeping.size());
+  const Scales largest = largest_reactions(problem.work);
+  ContactResult& result = problem.work.result;
+  const int before = result.iterations, left = static_cast<int>(settings.max_iterations) - before;
+  const int at_most = where.several && !where.by_pieces() ? std::min(most_of_a_patch, left) : 1;
+  Swept swept;
   for (const Turn& turn : where.turns)
   {
-    for (const Turn::Part& part : turn.own) sweep_patch(sweeping, turn.pairs(part), at_most, largest, swept);
-    act_on_other_patches(sweeping, where, turn);
+    for (const Turn::Part& part : turn.own) sweep_patch(problem, turn.pairs(part), at_most, largest, swept);
+    act_on_other_patches(problem, where, turn);
   }
-  for (std::size_t k = 0; k < sweeping.size(); ++k) swept[k].residual = estimated_residual(*sweeping[k], where);
+  swept.residual = estimated_residual(problem, where);
   agree(swept, where);
-  Problems<Entry> remaining;
-  for (std::size_t k = 0; k < sweeping.size(); ++k)
-  {
-    SweptProblem<Entry>& problem = *sweeping[k];
-    ContactResult& result = problem.work.result;
-    const int before = result.iterations;
-    result.iterations += std::max(1, static_cast<int>(swept[k].sweeps));
-    result.residual = swept[k].residual;
-    const bool moved = swept[k].sweeps > 0, due = result.iterations / 50 > before / 50;
-    problem.changed = problem.changed || moved;
-    if (due && (!problem.by_patches || where.by_pieces())) shorten_changes(problem);
-    problem.finished = !(result.residual > problem.target) || !moved;
-    if (!problem.finished && !due && result.iterations < settings.max_iterations) remaining.push_back(&problem);
-  }
-  sweeping = std::move(remaining);
+  result.iterations += std::max(1, static_cast<int>(swept.sweeps));
+  result.residual = swept.residual;
+  const bool moved = swept.sweeps > 0, due = result.iterations / 50 > before / 50;
+  problem.changed = problem.changed || moved;
+  if (due && (!problem.by_patches || where.by_pieces())) shorten_changes(problem);
+  problem.finished = !(result.residual > problem.target) || !moved;
+  return !problem.finished && !due && result.iterations < settings.max_iterations;
 }
 
-/// Makes the starts admissible: a warm start need not be, nor finite after a failed step. Where that changes reactions,
+/// Makes the start admissible: a warm start need not be, nor finite after a failed step. Where that changes reactions,
 /// their residual is known by dw alone.
 template <class Entry>
-void begin(const Problems<Entry>& problems, const SweptPairs& where, const ContactSettings& settings)
+void begin(SweptProblem<Entry>& problem, const SweptPairs& where, const ContactSettings& settings)
 {
-  for (SweptProblem<Entry>* problem : problems)
-  {
-    ContactWork& work = problem->work;
-    problem->known = work.r;
-    where.for_each_own(
-        [&](std::size_t pair)
-        {
-          change_reaction(*problem, pair,
-                          admissible(work.reaction(pair), velocity_of(*problem, pair), work.friction.of(pair)));
-        });
-  }
-  for (const Turn& turn : where.turns) act_on_other_patches(problems, where, turn);
-  std::vector<Swept> swept;
-  for (const SweptProblem<Entry>* problem : problems)
-    swept.push_back({problem->changed ? estimated_residual(*problem, where) : 0, problem->changed ? 1. : 0.});
+  ContactWork& work = problem.work;
+  problem.known = work.r;
+  where.for_each_own(
+      [&](std::size_t pair)
+      {
+        change_reaction(problem, pair,
+                        admissible(work.reaction(pair), velocity_of(problem, pair), work.friction.of(pair)));
+      });
+  for (const Turn& turn : where.turns) act_on_other_patches(problem, where, turn);
+  Swept swept{problem.changed ? estimated_residual(problem, where) : 0, problem.changed ? 1. : 0.};
   agree(swept, where);
-  for (std::size_t k = 0; k < problems.size(); ++k)
-  {
-    problems[k]->changed = swept[k].sweeps > 0;
-    if (!problems[k]->changed) continue;
-    problems[k]->exact_residual = swept[k].residual;
-    set_target(*problems[k], settings);
-  }
+  problem.changed = swept.sweeps > 0;
+  if (!problem.changed) return;
+  problem.exact_residual = swept.residual;
+  set_target(problem, settings);
 }
 
-/// Forms W r, and sets dw to zero, of the problems whose reactions changed; one product with W for all.
-template <class Entry> void update_products(const Problems<Entry>& problems, const SweptPairs& where)
+/// Forms W r, and sets dw to zero, where reactions changed.
+template <class Entry> void update_product(SweptProblem<Entry>& problem, const SweptPairs& where)
 {
-  std::vector<ContactWork*> stale;
-  for (SweptProblem<Entry>* problem : problems)
-  {
-    if (!problem->changed) continue;
-    stale.push_back(&problem->work);
-    problem->changed = false;
-    std::fill(problem->dw.begin(), problem->dw.end(), Entry{0});
-  }
+  if (!problem.changed) return;
+  ContactWork& work = problem.work;
+  problem.changed = false;
+  std::fill(problem.dw.begin(), problem.dw.end(), Entry{0});
   if (!where.shared() || rank_of(where.comm) == 0)
-    form_products(stale);
-  else if (!stale.empty())
-    stale.front()->W.follow_product();
-  if (where.shared())
-    for (ContactWork* work : stale) MPI_Bcast(work->Wr.data(), to_int(work->Wr.size()), MPI_DOUBLE, 0, where.comm);
+    form_product(work);
+  else
+    work.W.follow_product();
+  if (where.shared()) MPI_Bcast(work.Wr.data(), to_int(work.Wr.size()), MPI_DOUBLE, 0, where.comm);
 }
 
-/// Leaves the problems that are to be swept on after a product with W, for which dw is zero.
+/// Whether to sweep on after a product with W, for which dw is zero.
 template <class Entry>
-void leave_unfinished(Problems<Entry>& problems, const SweptPairs& where, const ContactSettings& settings)
+bool is_unfinished(SweptProblem<Entry>& problem, const SweptPairs& where, const ContactSettings& settings)
 {
-  std::vector<Swept> left;
-  for (const SweptProblem<Entry>* problem : problems) left.push_back({estimated_residual(*problem, where), 0});
+  Swept left{estimated_residual(problem, where), 0};
   agree(left, where);
-  Problems<Entry> remaining;
-  for (std::size_t k = 0; k < problems.size(); ++k)
-    if (continues(*problems[k], left[k].residual, settings)) remaining.push_back(problems[k]);
-  problems = std::move(remaining);
+  return continues(problem, left.residual, settings);
 }
 
-template <class Entry> void sweep_until_converged(std::span<ContactWork* const> works, const SweptPairs& where,
-                                                  const ContactSettings& settings)
+template <class Entry>
+void sweep_until_converged(ContactWork& work, const SweptPairs& where, const ContactSettings& settings)
 {
-  std::vector<SweptProblem<Entry>> problems;
-  problems.reserve(works.size());
-  for (ContactWork* work : works) problems.push_back({*work, std::vector<Entry>(work->b.size()), where.several});
-  Problems<Entry> all, active, fresh;
-  for (SweptProblem<Entry>& problem : problems) all.push_back(&problem);
-  begin(all, where, settings);
-  for (SweptProblem<Entry>* problem : all) (problem->changed ? active : fresh).push_back(problem);
-  leave_unfinished(fresh, where, settings);
-  active.insert(active.end(), fresh.begin(), fresh.end());
-  while (!active.empty())
+  SweptProblem<Entry> problem{work, std::vector<Entry>(work.b.size()), where.several};
+  begin(problem, where, settings);
+  bool active = problem.changed || is_unfinished(problem, where, settings);
+  while (active)
   {
-    Problems<Entry> sweeping = active;
-    while (!sweeping.empty()) sweep_once(sweeping, where, settings);
-    update_products<Entry>(active, where);
-    leave_unfinished(active, where, settings);
+    while (sweep_once(problem, where, settings))
+    {
+    }
+    update_product(problem, where);
+    active = is_unfinished(problem, where, settings);
   }
 }
 
-/// What rank 0 tells the others of the problems.
-struct Announced
-{
-  std::size_t problems = 0;
-  ContactSettings settings{};
-};
-static_assert(std::is_trivially_copyable_v<Announced>);
-
-/// Exchanges the problems in one message: the speed, b, r and W r of each.
-void exchange(std::span<ContactWork* const> works, std::span<std::vector<double>> b, MPI_Comm comm)
+/// Exchanges a problem in one message: the speed, b, r and W r.
+void exchange(ContactWork& work, std::vector<double>& b, MPI_Comm comm)
 {
   std::vector<double> message;
   if (rank_of(comm) == 0)
-    for (const ContactWork* work : works)
-    {
-      message.push_back(work->speed);
-      for (const std::span<const double> entries : {std::span<const double>(work->b), {work->r}, {work->Wr}})
-        message.insert(message.end(), entries.begin(), entries.end());
-    }
+  {
+    message.push_back(work.speed);
+    for (const std::span<const double> entries : {std::span<const double>(work.b), {work.r}, {work.Wr}})
+      message.insert(message.end(), entries.begin(), entries.end());
+  }
   broadcast(message, comm);
   if (rank_of(comm) == 0) return;
   auto entry = message.begin();
-  for (std::size_t k = 0; k < works.size(); ++k)
+  const auto size = static_cast<std::ptrdiff_t>(work.W.size());
+  work.speed = *entry++;
+  for (std::vector<double>* entries : {&b, &work.r, &work.Wr})
   {
-    const auto size = static_cast<std::ptrdiff_t>(works[k]->W.size());
-    works[k]->speed = *entry++;
-    for (std::vector<double>* entries : {&b[k], &works[k]->r, &works[k]->Wr})
-    {
-      entries->assign(entry, entry + size);
-      entry += size;
-    }
+    entries->assign(entry, entry + size);
+    entry += size;
   }
 }
 
 /// With the other ranks, which would wait for this one for ever if it left by an exception: that ends the program.
-void sweep_together(std::span<ContactWork* const> works, const ContactSettings& settings) noexcept
+void sweep_together(ContactWork& work, ContactSettings settings) noexcept
 {
-  const ContactWork& first = *works.front();
-  const MPI_Comm comm = first.W.shared_by();
+  const MPI_Comm comm = work.W.shared_by();
   int task = task_of_sweeps;
   MPI_Bcast(&task, 1, MPI_INT, 0, comm);
-  Announced announced{works.size(), settings};
-  MPI_Bcast(&announced, sizeof announced, MPI_BYTE, 0, comm);
-  (void)announced_friction(first.friction, comm);
-  exchange(works, {}, comm);
-  sweep_until_converged<float>(works, patches_of(first.W), settings);
+  static_assert(std::is_trivially_copyable_v<ContactSettings>);
+  MPI_Bcast(&settings, sizeof settings, MPI_BYTE, 0, comm);
+  (void)announced_friction(work.friction, comm);
+  std::vector<double> unread;
+  exchange(work, unread, comm);
+  sweep_until_converged<float>(work, patches_of(work.W), settings);
 }
 
 /// Reactions that sweeps began with, and W times them.
@@ -404,47 +338,29 @@ void begin_as_one(ContactWork& work, const SweepStart& start)
 
 void sweep_along(const ContactOperator& W)
 {
-  Announced announced;
-  MPI_Bcast(&announced, sizeof announced, MPI_BYTE, 0, W.shared_by());
+  ContactSettings settings;
+  MPI_Bcast(&settings, sizeof settings, MPI_BYTE, 0, W.shared_by());
   const PairFriction friction = announced_friction({}, W.shared_by());
-  std::vector<std::vector<double>> b(announced.problems), r(announced.problems);
-  std::vector<ContactWork> works;
-  works.reserve(announced.problems);
-  std::vector<ContactWork*> all;
-  for (std::size_t k = 0; k < announced.problems; ++k)
-    all.push_back(&works.emplace_back(ContactWork{W, friction, b[k], r[k], {}}));
-  exchange(all, b, W.shared_by());
-  sweep_until_converged<float>(all, patches_of(W), announced.settings);
+  std::vector<double> b, r;
+  ContactWork work{W, friction, b, r, {}};
+  exchange(work, b, W.shared_by());
+  sweep_until_converged<float>(work, patches_of(W), settings);
 }
 
-void gauss_seidel(std::span<ContactWork* const> works, const ContactSettings& settings)
+void gauss_seidel(ContactWork& work, const ContactSettings& settings)
 {
-  if (works.empty()) return;
-  const ContactOperator& W = works.front()->W;
-  std::vector<ContactWork*> left(works.begin(), works.end());
-  const auto leave_open = [&]
-  {
-    std::erase_if(left, [&](const ContactWork* work)
-                  { return work->result.converged || work->result.iterations >= settings.max_iterations; });
-  };
+  const ContactOperator& W = work.W;
+  const auto is_open = [&] { return !work.result.converged && work.result.iterations < settings.max_iterations; };
   if (W.patches().size() > 1)
   {
-    std::vector<SweepStart> starts;
-    for (const ContactWork* work : left) starts.push_back({work->r, work->Wr});
-    const std::vector<ContactWork*> all = left;
-    W.shares_patches() ? sweep_together(left, settings) : sweep_until_converged<float>(left, patches_of(W), settings);
-    leave_open();
-    for (std::size_t k = 0; k < all.size(); ++k)
-      if (std::ranges::find(left, all[k]) != left.end()) begin_as_one(*all[k], starts[k]);
+    const SweepStart start{work.r, work.Wr};
+    W.shares_patches() ? sweep_together(work, settings) : sweep_until_converged<float>(work, patches_of(W), settings);
+    if (is_open()) begin_as_one(work, start);
   }
-  if (W.has_near_field())
-  {
-    sweep_until_converged<float>(left, one_patch(W), settings);
-    leave_open();
-  }
-  if (left.empty() || !W.is_stored()) return;
+  if (W.has_near_field() && is_open()) sweep_until_converged<float>(work, one_patch(W), settings);
+  if (!is_open()) return;
   W.ask_for_whole();
-  sweep_until_converged<double>(left, one_patch(W), settings);
+  sweep_until_converged<double>(work, one_patch(W), settings);
 }
 
 } // namespace squeal

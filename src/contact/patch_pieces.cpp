@@ -4,7 +4,6 @@
 /// see each other's changes when all have been swept (src/README.md, section 4.7), and push each other little.
 #include "near_field.hpp"
 
-#include <numeric>
 #include <utility>
 
 namespace squeal
@@ -82,28 +81,12 @@ double push_beside(const Patch& patch, const std::vector<std::size_t>& piece_of)
   return most;
 }
 
-/// Whether a pair has a neighbour in another piece of the same parity.
-bool neighbours_side_by_side(const Patch& patch, const std::vector<std::size_t>& piece_of)
-{
-  bool found = false;
-  for (std::size_t i = 0; i < patch.pairs() && !found; ++i)
-    patch.for_each_block(i,
-                         [&](std::size_t j, double size)
-                         {
-                           const bool beside = piece_of[i] != piece_of[j] && piece_of[i] % 2 == piece_of[j] % 2;
-                           found = found || (beside && size >= neighbour);
-                         });
-  return found;
-}
-
 /// The piece of each pair of a single patch: slices from one end of it to the other, as many as may be swept side by
-/// side; none where even two a turn push each other too much. Slices by the pairs' numbers, where these run from end to
-/// end, leave long runs of columns in one piece.
+/// side; none where even two a turn push each other too much.
 std::vector<std::size_t> pieces_of(const Patch& patch)
 {
   const std::size_t pairs = patch.pairs();
-  std::vector<std::size_t> order(pairs);
-  std::iota(order.begin(), order.end(), 0);
+  const std::vector<std::size_t> order = from_end_to_end(patch);
   const auto cut = [&](std::size_t pieces)
   {
     std::vector<std::size_t> piece_of(pairs);
@@ -111,11 +94,6 @@ std::vector<std::size_t> pieces_of(const Patch& patch)
     return piece_of;
   };
   std::vector<std::size_t> best = cut(fewest_pieces);
-  if (neighbours_side_by_side(patch, best))
-  {
-    order = from_end_to_end(patch);
-    best = cut(fewest_pieces);
-  }
   if (!(push_beside(patch, best) <= strong_of_two)) return {};
   for (std::size_t pieces = 2 * fewest_pieces; pairs / pieces >= least_of_a_piece; pieces *= 2)
   {

@@ -1,6 +1,6 @@
 /// Products that ranks form together. Of a W whose columns they share: y = sum over ranks of what the lower triangle of
-/// their columns and its transpose have in W x. Columns go to ranks by equal parts of the triangle. Of a W in the
-/// factor: each rank reads its part of the factor. Whole patches of the near field go to ranks, for sweeps.
+/// their columns and its transpose have in W x. Columns go to ranks by equal parts of the triangle. Whole patches of
+/// the near field go to ranks, for sweeps.
 #include "gauss_seidel.hpp"
 #include "near_field.hpp"
 #include "squeal/algebra/panel.hpp"
@@ -200,14 +200,14 @@ void ContactOperator::gather() const
 
 void ContactOperator::hold_whole() const
 {
-  if (shared_by_ == MPI_COMM_NULL || products_ || held_whole_) return;
+  if (shared_by_ == MPI_COMM_NULL || held_whole_) return;
   on_rank_zero(shared_by_, [&] { make_place(); });
   gather();
 }
 
 void ContactOperator::ask_for_whole() const
 {
-  if (shared_by_ == MPI_COMM_NULL || products_ || held_whole_) return;
+  if (shared_by_ == MPI_COMM_NULL || held_whole_) return;
   make_place(); // before the others wait for it: there may be none
   int task = task_of_gathering;
   MPI_Bcast(&task, 1, MPI_INT, 0, shared_by_);
@@ -249,63 +249,39 @@ void ContactOperator::share_patches()
   }
 }
 
-void ContactOperator::add_strips(std::size_t lanes, const std::vector<double>& x, std::vector<double>& y) const
+void ContactOperator::add_strips(const std::vector<double>& x, std::vector<double>& y) const
 {
   for_each_strip(
       [&](const CondensedStrip& strip)
       {
-        const std::size_t width = strip.last - strip.first, first = strip.first * lanes;
-        if (lanes == 1)
-          add_symmetric_product(strip.values, strip.height, width, x.data() + first, y.data() + first);
-        else
-          add_symmetric_product(strip.values, strip.height, width, lanes, x.data() + first, y.data() + first);
+        add_symmetric_product(strip.values, strip.height, strip.last - strip.first, x.data() + strip.first,
+                              y.data() + strip.first);
       });
 }
 
-/// y = W x of so many columns, x and y by lanes.
-void ContactOperator::multiply_lanes(std::size_t columns, std::vector<double>& x, std::vector<double>& y) const
+/// y = W x
+void ContactOperator::multiply_stored(std::vector<double>& x, std::vector<double>& y) const
 {
-  const std::size_t lanes = lanes_for(columns), n = size();
-  if (shared_by_ == MPI_COMM_NULL)
-    return lanes == 1 ? add_symmetric_product(values_.data(), n, n, x.data(), y.data())
-                      : dense_product(values_.data(), n, n, lanes, x.data(), y.data());
-  int task = to_int(columns);
+  if (shared_by_ == MPI_COMM_NULL) return add_symmetric_product(values_.data(), size(), size(), x.data(), y.data());
+  int task = task_of_product;
   MPI_Bcast(&task, 1, MPI_INT, 0, shared_by_);
   MPI_Bcast(x.data(), to_int(x.size()), MPI_DOUBLE, 0, shared_by_);
-  add_strips(lanes, x, y);
+  add_strips(x, y);
   MPI_Reduce(MPI_IN_PLACE, y.data(), to_int(y.size()), MPI_DOUBLE, MPI_SUM, 0, shared_by_);
-}
-
-/// On rank 0.
-std::vector<double> ContactOperator::multiply_by_factor(std::span<const double> x, std::size_t columns) const
-{
-  int task = to_int(columns);
-  if (shared_by_ != MPI_COMM_NULL) MPI_Bcast(&task, 1, MPI_INT, 0, shared_by_);
-  std::vector<double> y = products_->products.product(x, columns);
-  const std::vector<double>& added = products_->diagonal;
-  for (std::size_t i = 0; i < y.size(); ++i)
-    y[i] = products_->scale * y[i] + (added.empty() ? 0 : added[i % added.size()] * x[i]);
-  return y;
 }
 
 void ContactOperator::follow_product() const
 {
   int task = 0;
   MPI_Bcast(&task, 1, MPI_INT, 0, shared_by_);
-  serve_product(task);
+  serve_product();
 }
 
-void ContactOperator::serve_product(int columns) const
+void ContactOperator::serve_product() const
 {
-  const auto count = static_cast<std::size_t>(columns);
-  if (products_)
-  {
-    (void)products_->products.product({}, count);
-    return;
-  }
-  std::vector<double> x(rows_ * lanes_for(count)), y(x.size());
+  std::vector<double> x(rows_), y(rows_);
   MPI_Bcast(x.data(), to_int(x.size()), MPI_DOUBLE, 0, shared_by_);
-  add_strips(lanes_for(count), x, y);
+  add_strips(x, y);
   MPI_Reduce(y.data(), nullptr, to_int(y.size()), MPI_DOUBLE, MPI_SUM, 0, shared_by_);
 }
 
@@ -323,7 +299,7 @@ ServedProducts::ServedProducts(const ContactOperator& W) : W_(W)
     else if (task == task_of_gathering)
       W.gather();
     else
-      W.serve_product(task);
+      W.serve_product();
   }
 }
 

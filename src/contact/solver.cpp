@@ -29,8 +29,7 @@ void project(ContactWork& work, double rho)
 void fixed_point(ContactWork& work, const ContactSettings& settings)
 {
   ContactResult& result = work.result;
-  ContactWork* const alone[] = {&work};
-  form_products(alone);
+  form_product(work);
   result.residual = residual_of(work);
   // a lower bound, close enough for a step that adapts
   const std::vector<double> ones(work.W.size(), 1.);
@@ -41,7 +40,7 @@ void fixed_point(ContactWork& work, const ContactSettings& settings)
          result.iterations < settings.max_iterations)
   {
     project(work, rho);
-    form_products(alone);
+    form_product(work);
     ++result.iterations;
     result.residual = residual_of(work);
     best = std::min(best, result.residual);
@@ -105,39 +104,20 @@ void remember(const ContactWork& work, ContactMemory& memory)
 
 } // namespace
 
-std::vector<ContactResult> solve_contacts(const ContactOperator& W, const PairFriction& friction,
-                                          const ContactSettings& settings, std::span<const ContactProblem> problems)
+ContactResult solve_contact(const ContactOperator& W, const PairFriction& friction, const ContactSettings& settings,
+                            const ContactProblem& problem)
 {
-  std::vector<ContactWork> works;
-  for (const ContactProblem& problem : problems) works.push_back(start(W, friction, problem));
-  if (W.pairs() == 0) return std::vector<ContactResult>(problems.size(), {0, 0, true});
-  switch (settings.solver)
+  ContactWork work = start(W, friction, problem);
+  if (W.pairs() == 0) return {0, 0, true};
+  if (settings.solver == ContactSolver::fixed_point)
+    fixed_point(work, settings);
+  else
   {
-  case ContactSolver::gauss_seidel:
-  {
-    std::vector<ContactWork*> all, cold;
-    for (std::size_t k = 0; k < works.size(); ++k)
-    {
-      all.push_back(&works[k]);
-      if (!start_warm(works[k], problems[k].memory)) cold.push_back(&works[k]);
-    }
-    form_products(cold);
-    gauss_seidel(all, settings);
-    if (!W.is_stored()) // sweeps over the near field may not converge where friction is strong
-      for (ContactWork& work : works)
-        if (!work.result.converged) fixed_point(work, settings);
-    break;
+    if (!start_warm(work, problem.memory)) form_product(work);
+    gauss_seidel(work, settings);
   }
-  case ContactSolver::fixed_point:
-    for (ContactWork& work : works) fixed_point(work, settings);
-  }
-  std::vector<ContactResult> results;
-  for (std::size_t k = 0; k < works.size(); ++k)
-  {
-    remember(works[k], problems[k].memory);
-    results.push_back(works[k].result);
-  }
-  return results;
+  remember(work, problem.memory);
+  return work.result;
 }
 
 double contact_residual(const ContactOperator& W, const PairFriction& friction, const std::vector<double>& b,
@@ -146,8 +126,7 @@ double contact_residual(const ContactOperator& W, const PairFriction& friction, 
   std::vector<double> reactions = r;
   ContactMemory nothing;
   ContactWork work = start(W, friction, {b, reactions, nothing});
-  ContactWork* const alone[] = {&work};
-  form_products(alone);
+  form_product(work);
   return residual_of(work);
 }
 

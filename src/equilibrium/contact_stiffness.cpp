@@ -3,16 +3,20 @@
 namespace squeal
 {
 
-Owned<Mat> stiffness_of_pairs(const Interface& interface, const std::vector<char>& closed, PairForces part)
+namespace
+{
+
+/// A matrix on the rows of B with what add_pair(pair, first row, set) sets for the closed pairs, `width` entries a row
+/// at most; null where all is zero. Collective.
+template <class AddPair>
+Owned<Mat> on_pair_rows(const Interface& interface, const std::vector<char>& closed, PetscInt width, AddPair add_pair)
 {
   const PairRows<PetscInt> rows(interface.directions);
-  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
-  const TangentView e(directions, interface.directions);
   PetscInt first = 0, last = 0;
   check(MatGetOwnershipRange(interface.B, &first, &last));
-  Owned<Mat> result;
-  check(MatCreateAIJ(comm_of(interface.B), last - first, last - first, PETSC_DETERMINE, PETSC_DETERMINE, 1, nullptr, 1,
-                     nullptr, result.put()));
+  Owned<Mat> result; // a pair may straddle ranks
+  check(MatCreateAIJ(comm_of(interface.B), last - first, last - first, PETSC_DETERMINE, PETSC_DETERMINE, width, nullptr,
+                     width, nullptr, result.put()));
   bool any = false; // alike on every rank
   const auto set = [&](PetscInt row, PetscInt column, double value)
   {
@@ -20,22 +24,31 @@ Owned<Mat> stiffness_of_pairs(const Interface& interface, const std::vector<char
     if (value != 0 && row >= first && row < last) check(MatSetValue(result, row, column, value, INSERT_VALUES));
   };
   for (std::size_t i = 0; i < closed.size(); ++i)
+    if (closed[i]) add_pair(i, rows.normal(static_cast<PetscInt>(i)), set);
+  if (!any) return {};
+  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
+  return result;
+}
+
+} // namespace
+
+Owned<Mat> stiffness_of_pairs(const Interface& interface, const std::vector<char>& closed, PairForces part)
+{
+  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
+  const TangentView e(directions, interface.directions);
+  const auto add_pair = [&](std::size_t i, PetscInt normal, const auto& set)
   {
-    if (!closed[i]) continue;
     const double c = compliance_of(interface, i), of_slip = slip_compliance_of(interface, i);
-    const PetscInt normal = rows.normal(static_cast<PetscInt>(i));
     if (c > 0) set(normal, normal, 1 / c);
-    for (PetscInt k = 1; k < rows.per_pair(); ++k)
+    for (PetscInt k = 1; k <= interface.directions; ++k)
     {
       if (of_slip > 0) set(normal + k, normal + k, 1 / of_slip);
       if (c > 0 && part == PairForces::with_friction)
         set(normal + k, normal, mu[i] * e.of(i)[static_cast<std::size_t>(k - 1)] / c);
     }
-  }
-  if (!any) return {};
-  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
-  return result;
+  };
+  return on_pair_rows(interface, closed, 2, add_pair);
 }
 
 Owned<Mat> contact_stiffness(const Interface& interface, const std::vector<char>& closed, PairForces part)
@@ -48,35 +61,18 @@ Owned<Mat> contact_stiffness(const Interface& interface, const std::vector<char>
 Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>& closed,
                             const std::vector<double>& reactions, FrictionDamping part)
 {
-  const PairRows<PetscInt> rows(interface.directions);
   const TangentView drive(interface.drive, interface.directions);
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(interface.B, &first, &last));
-  Owned<Mat> result;
-  check(MatCreateAIJ(comm_of(interface.B), last - first, last - first, PETSC_DETERMINE, PETSC_DETERMINE,
-                     interface.directions, nullptr, interface.directions, nullptr,
-                     result.put())); // a pair may straddle ranks
-  bool any = false;                  // alike on every rank
-  for (std::size_t i = 0; i < closed.size(); ++i)
+  const auto add_pair = [&](std::size_t i, PetscInt normal, const auto& set)
   {
     const double reaction = PairView(reactions, interface.directions).normal(i);
-    if (!closed[i] || reaction <= 0) continue;
+    if (reaction <= 0) return;
     const SlidingFriction friction = sliding_friction(interface.friction.of(i), reaction, drive.of(i)); // even in s
     const auto& damping = part == FrictionDamping::whole ? friction.damping : friction.damping_of_speed;
-    const PetscInt tangential = rows.tangential(static_cast<PetscInt>(i));
-    for (PetscInt k = 0; k < rows.directions; ++k)
-      for (PetscInt l = 0; l < rows.directions; ++l)
-      {
-        const double value = damping[static_cast<std::size_t>(k)][static_cast<std::size_t>(l)];
-        any = any || value != 0;
-        if (tangential + k >= first && tangential + k < last)
-          check(MatSetValue(result, tangential + k, tangential + l, value, INSERT_VALUES));
-      }
-  }
-  if (!any) return {};
-  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
-  return result;
+    for (PetscInt k = 0; k < interface.directions; ++k)
+      for (PetscInt l = 0; l < interface.directions; ++l)
+        set(normal + 1 + k, normal + 1 + l, damping[static_cast<std::size_t>(k)][static_cast<std::size_t>(l)]);
+  };
+  return on_pair_rows(interface, closed, interface.directions, add_pair);
 }
 
 Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>& closed,

@@ -4,7 +4,6 @@
 #include "squeal/contact/sliding_direction.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <string>
 
 namespace squeal
@@ -134,35 +133,23 @@ double fall_at_pairs(const ContactOperator& W, const PairFriction& friction, con
   return largest;
 }
 
-/// Solves the problems of these trajectories; returns those that are to be solved again, with less past sliding.
-std::vector<std::size_t> solve_once(const StepBatch& batch, std::vector<StepProblem>& problems,
-                                    const std::vector<std::size_t>& trajectories)
+/// Solves the problem of trajectory k; returns whether it is to be solved again, with less past sliding.
+bool solve_once(const StepBatch& batch, StepProblem& problem, std::size_t k)
 {
   const auto& [step, interface, factors, works, states, reports] = batch;
-  std::vector<std::vector<double>> b;
-  for (const std::size_t k : trajectories) b.push_back(sum(problems[k].free, problems[k].past));
-  std::vector<ContactProblem> unsolved;
-  for (std::size_t j = 0; j < trajectories.size(); ++j)
-    unsolved.push_back({b[j], states[trajectories[j]].reactions, works[trajectories[j]].memory});
+  const std::vector<double> b = sum(problem.free, problem.past);
   const PairFriction law = law_of_step(scaled(interface, factors.friction), step.theta);
-  const std::vector<ContactResult> results = solve_contacts(step.W, law, step.contact, unsolved);
-  std::vector<std::size_t> again;
-  for (std::size_t j = 0; j < trajectories.size(); ++j)
-  {
-    const std::size_t k = trajectories[j];
-    StepReport& report = reports[k];
-    report.contact_iterations += results[j].iterations;
-    report.contact_residual = results[j].residual;
-    report.contact_converged = results[j].converged;
-    report.contact_as_one = report.contact_as_one || results[j].as_one;
-    report.fall_of_friction = fall_at_pairs(step.W, law, states[k].reactions);
-    const std::vector<double> w = sum(works[k].memory.Wr.front(), b[j]);
-    if (works[k].record) works[k].record->contact_velocity = w;
-    if (leave_out_where_turned(PairView<const double>(states[k].reactions, interface.directions),
-                               PairView(w, interface.directions), PairView(problems[k].past, interface.directions)))
-      again.push_back(k);
-  }
-  return again;
+  const ContactResult result = solve_contact(step.W, law, step.contact, {b, states[k].reactions, works[k].memory});
+  StepReport& report = reports[k];
+  report.contact_iterations += result.iterations;
+  report.contact_residual = result.residual;
+  report.contact_converged = result.converged;
+  report.contact_as_one = report.contact_as_one || result.as_one;
+  report.fall_of_friction = fall_at_pairs(step.W, law, states[k].reactions);
+  const std::vector<double> w = sum(works[k].memory.Wr.front(), b);
+  if (works[k].record) works[k].record->contact_velocity = w;
+  return leave_out_where_turned(PairView<const double>(states[k].reactions, interface.directions),
+                                PairView(w, interface.directions), PairView(problem.past, interface.directions));
 }
 
 /// Gives every rank what rank 0 found, in one message: latency counts on small models. Collective.
@@ -225,9 +212,10 @@ std::string solve_all(const StepBatch& batch, std::vector<StepProblem>& problems
   if (rank_of(comm_of(batch.interface.B)) != 0) return {};
   try
   {
-    std::vector<std::size_t> unsolved(problems.size());
-    std::iota(unsolved.begin(), unsolved.end(), 0);
-    while (!unsolved.empty()) unsolved = solve_once(batch, problems, unsolved);
+    for (std::size_t k = 0; k < problems.size(); ++k)
+      while (solve_once(batch, problems[k], k))
+      {
+      }
   }
   catch (const std::exception& error)
   {

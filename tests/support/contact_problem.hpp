@@ -27,8 +27,7 @@ inline ContactResult solve_contact(const ContactOperator& W, const std::vector<d
                                    const ContactSettings& settings, std::vector<double>& r)
 {
   ContactMemory nothing;
-  const ContactProblem problem{b, r, nothing};
-  return solve_contacts(W, friction, settings, std::span(&problem, 1))[0];
+  return squeal::solve_contact(W, friction, settings, {b, r, nothing});
 }
 
 } // namespace squeal::test

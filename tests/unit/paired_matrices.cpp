@@ -52,9 +52,11 @@ double difference(Mat A, Vec x, Vec y)
 
 } // namespace
 
-TEST_CASE("matrices of different patterns side by side give the products of each")
+TEST_CASE("matrices side by side give the products of each; those of two patterns stay apart")
 {
-  const auto M = striped(41, 3), K = striped(41, 2);
+  const auto M = striped(41, 3), K = copy_of(M.get());
+  check(MatScale(K, 0.7));
+  CHECK_FALSE(pair_matrices(M, striped(41, 2)).has_value());
   const std::optional<PairedMatrices> matrices = pair_matrices(M, K);
   REQUIRE(matrices.has_value());
   const auto v = wave(M, 0), u = wave(M, 1), Mv = wave(M, 2), Ku = wave(M, 3);

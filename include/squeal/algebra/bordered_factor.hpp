@@ -74,11 +74,8 @@ public:
   bool failed() const;
 
   /// scale B A^-1 B', row-major, symmetric to the last bit; on rank 0 only, empty elsewhere. MUMPS's factor
-  /// moves its storage out: call it once, or read the strips once.
+  /// moves its storage out: call it once.
   std::vector<double> condensed(double scale) const;
-
-  /// Gives B A^-1 B' to `take` on rank 0, strip after strip.
-  void read_condensed(const std::function<void(const CondensedStrip&)>& take) const;
 
   /// B A^-1 B' without storing it; nothing of MUMPS, which has stored it already.
   std::optional<CondensedProducts> condensed_products() const;
@@ -107,12 +104,6 @@ class CondensedProducts
 public:
   /// Rows of B.
   int size() const;
-
-  /// Numbers of E that a product reads, on all ranks.
-  double entries() const;
-
-  /// The product with each of `columns` vectors x, one after the other; x is read and the product given on rank 0.
-  std::vector<double> product(std::span<const double> x, std::size_t columns) const;
 
   /// Columns that strips do not part, but for the last ones: whole pairs of two or three rows, and whole tiles.
   static constexpr std::size_t together = 24;

@@ -29,7 +29,7 @@ struct PairedMatrices
   Owned<PetscSF> exchange;  // of their rows
 };
 
-/// Nothing unless M and K are sparse. Collective.
+/// Nothing unless M and K are sparse and of one pattern with the diagonal. Collective.
 std::optional<PairedMatrices> pair_matrices(Mat M, Mat K);
 
 /// `to` = (M v, K u) of `of` = (v, u). Collective.

@@ -12,8 +12,6 @@
 /// fixed_point: the paper's r_n <- max(0, r_n - rho w_n), r_t <- proj_disc(mu r_n)(r_t - rho w_t). It contracts without
 /// friction for 0 < rho < 2/lambda_max(W), at a rate set by cond(W).
 ///
-/// Problems with the same W are solved together: each row of W that is read serves all of them.
-///
 /// Caveat: neither is sure to converge where mu couples sliding and pressure strongly; the result says so.
 #include "squeal/base/petsc.hpp"
 #include "squeal/base/words.hpp"
@@ -64,10 +62,10 @@ struct ContactProblem
   ContactMemory& memory;
 };
 
-/// Solves all problems, each from its `r`, which becomes the solution [N]. A problem that does not converge says so
-/// in its result. On rank 0, while the ranks that share W are within ServedProducts.
-std::vector<ContactResult> solve_contacts(const ContactOperator& W, const PairFriction& friction,
-                                          const ContactSettings& settings, std::span<const ContactProblem> problems);
+/// Solves a problem from its `r`, which becomes the solution [N]. A problem that does not converge says so in its
+/// result. On rank 0, while the ranks that share W are within ServedProducts.
+ContactResult solve_contact(const ContactOperator& W, const PairFriction& friction, const ContactSettings& settings,
+                            const ContactProblem& problem);
 
 /// The residual above of reactions r to the free velocities b. On the rank that has W.
 double contact_residual(const ContactOperator& W, const PairFriction& friction, const std::vector<double>& b,

@@ -1,7 +1,7 @@
 #pragma once
 /// Sliding equilibrium in unilateral contact with Coulomb friction (src/README.md, section 2):
 ///     K u0 = F + B_n' r_n + B_t' r_t,   0 <= g _|_ r_n >= 0,   r_t = mu r_n e,   e = v_d/|v_d|.
-/// Status (active set) iteration on the condensed compliance D = B K^-1 B'; projection fixed point as the check.
+/// Newton's method on the statuses of the pairs by the condensed compliance D = B K^-1 B'; the natural map checks it.
 ///
 /// With D_nn and D_nt the blocks of D, the gaps are g = q + (D_nn + mu D_nt e) r_n, q those without reactions. Where
 /// contact alone holds a body, K is singular. Springs kappa across every pair are then added and their force is taken

@@ -118,7 +118,7 @@ struct StepReport
   std::vector<double> joint_work; // [J] of the undriven pairs of each contact; empty: there are none
 };
 
-/// One step in place of several trajectories: each reading of the factor and of W serves them all.
+/// One step in place of several trajectories: each reading of the factor serves them all.
 std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
                                 std::span<StepWork> works, std::span<State> states);
 
