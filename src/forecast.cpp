@@ -145,6 +145,13 @@ double memory_of_response(const Sizes& sizes, const Scene& scene, const ProgramO
          3 * 2 * number * sizes.ranks * pairs * scene.response->count;
 }
 
+/// Whether W stays in the factor, of the memory that is left beside it.
+bool stays_in_factor(const Sizes& sizes, double free)
+{
+  return sizes.factor.border_entries > 0 &&
+         squeal::stays_in_factor(sizes.contact, sizes.factor.border_entries, free - memory_of_factor(sizes));
+}
+
 bool shares_operator(const Sizes& sizes)
 {
   return sizes.factor.border_entries > 0 && is_worth_sharing(sizes.contact, static_cast<int>(sizes.ranks));
@@ -152,21 +159,21 @@ bool shares_operator(const Sizes& sizes)
 
 /// M and K together, the factor, and the near field in single precision, which may be all of W: 0.11 of it on the brake
 /// of 33 224 degrees of freedom. W is whole on rank 0, or ranks share its lower triangle.
-double memory_of_step(const Sizes& sizes)
+double memory_of_step(const Sizes& sizes, bool in_factor)
 {
   const double whole = sizes.condensed_operator(), near_field = whole / 2,
                stored = shares_operator(sizes) ? whole / 2 : whole;
   return (2 * number + sizeof(PetscInt)) * sizes.entries / 2 + matrix_entry * sizes.entries + memory_of_factor(sizes) +
-         near_field + stored + number * vectors_of_modes_kept * sizes.dofs;
+         near_field + (in_factor ? 0 : stored) + number * vectors_of_modes_kept * sizes.dofs;
 }
 
 /// A reduced model has at most a shape for each pair, and those of the modes. Two may be held: that of the start, which
 /// takes no more than its part of what is `free`, and that of the multipliers. Both have fewer shapes unless the
 /// reduced cycle is the answer. The latter is done without where it does not fit. The tangent needs a whole W.
-double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, double free)
+double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, bool in_factor, double free)
 {
-  const double whole = shares_operator(sizes) ? sizes.condensed_operator() : 0;
-  const double least = memory_of_step(sizes) + whole + number * vectors_of_shooting * sizes.dofs;
+  const double whole = in_factor || shares_operator(sizes) ? sizes.condensed_operator() : 0;
+  const double least = memory_of_step(sizes, in_factor) + whole + number * vectors_of_shooting * sizes.dofs;
   const auto shapes = [&](double pairs) { return memory_of_reduction(sizes.dofs, pairs + vectors_of_modes_kept); };
   const double multipliers = shapes(std::min<double>(sizes.pairs, attachments_on_recorded_contact)),
                all = fidelity == CycleModel::reduced ? shapes(sizes.pairs) : multipliers;
@@ -201,9 +208,11 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   forecast.factor_limit = 1e9 * options.factor.share_limit();
   forecast.held = sum_of_ranks(memory_entry("/proc/self/status", "VmRSS:").value_or(0), comm);
   const double free = free_memory(comm);
-  const bool whole_operator = scene.cycle.enabled || !shares_operator(sizes); // tangents need one
+  const bool in_factor = stays_in_factor(sizes, free);
+  const bool whole_operator = scene.cycle.enabled || (!in_factor && !shares_operator(sizes)); // tangents need one
   forecast.on_rank_zero = sizes.condensed_operator() + (whole_operator ? 0 : 4 * number * sizes.pairs * sizes.pairs);
-  const double contact = sizes.condensed_operator(); // two products a step, each of which reads half of W
+  // two products a step, each of which reads half of W, or the rows of E twice
+  const double contact = in_factor ? 4 * number * sizes.factor.border_entries : sizes.condensed_operator();
   forecast.step_seconds = seconds_of_calls + (sizes.factor.bytes + contact) / sizes.ranks / bytes_a_second;
   forecast.factor_seconds = sizes.factor.operations / operations_a_second;
   const auto add = [&](Stage stage, double bytes) { forecast.stages.push_back({stage, forecast.held + bytes}); };
@@ -212,8 +221,8 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   if (scene.response) add(Stage::response, memory_of_response(sizes, scene, options, comm));
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)
-    add(Stage::transient, memory_of_step(sizes) + number * entries * steps_of_transient(scene.transient));
-  if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity, free));
+    add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient));
+  if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity, in_factor, free));
   if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)));
   if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));
   forecast.steps = steps_of(scene, options);

@@ -187,6 +187,16 @@ int CondensedProducts::size() const
   return parts_->border;
 }
 
+double CondensedProducts::entries() const
+{
+  return parts_->cholesky->border_entries();
+}
+
+std::vector<double> CondensedProducts::product(std::span<const double> x) const
+{
+  return parts_->cholesky->schur_product(x);
+}
+
 void CondensedProducts::read(const std::function<void(const CondensedStrip&)>& take,
                              std::span<const std::size_t> shares) const
 {

@@ -59,6 +59,7 @@ SQUEAL_SIMD void add_rows(const float* rows, std::size_t length, std::size_t num
 
 void ContactOperator::multiply(std::span<const double> x, std::span<double> y) const
 {
+  if (products_) return multiply_by_factor(x, y);
   std::vector<double> from(x.begin(), x.end()), to(x.size());
   multiply_stored(from, to);
   std::ranges::copy(to, y.begin());
@@ -152,10 +153,18 @@ ContactOperator make_contact_operator(std::vector<double> W, int pairs, int dire
   return op;
 }
 
-ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int directions, MPI_Comm comm)
+bool stays_in_factor(double rows, double border_entries, double free)
+{
+  const double half = rows * rows / 2; // of a symmetric W, which a product reads; or E twice
+  return 2 * border_entries < half || sizeof(double) * 2 * half > free / 4;
+}
+
+ContactOperator make_contact_operator(const ScaledProducts& W, OperatorStorage storage, int pairs, int directions,
+                                      MPI_Comm comm)
 {
   ContactOperator op;
-  NearFieldBuilder builder(static_cast<std::size_t>(pairs), directions, comm);
+  const bool by_factor = storage == OperatorStorage::by_factor;
+  NearFieldBuilder builder(static_cast<std::size_t>(pairs), directions, by_factor ? PETSC_COMM_SELF : comm);
   std::vector<double> values;
   const auto scaled = [&](const CondensedStrip& strip)
   {
@@ -165,25 +174,38 @@ ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int di
       values[(j - strip.first) * (strip.height + 1)] += W.diagonal[j];
     return CondensedStrip{strip.first, strip.last, strip.height, values.data()};
   };
-  const std::size_t rows = PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs));
-  W.products.read(
-      [&](const CondensedStrip& strip)
-      {
-        const CondensedStrip now = scaled(strip);
-        builder.measure(now);
-        op.append_strips(now);
-      },
-      op.share_columns(rows, comm));
-  builder.agree();
-  op.for_each_strip([&](const CondensedStrip& strip) { builder.collect(strip); });
-  op.near_ = builder.finish();
-  if (rank_of(comm) == 0)
+  const bool first = rank_of(comm) == 0;
+  if (by_factor)
+  {
+    op.products_ = W;
+    if (ranks_of(comm) > 1) op.shared_by_ = comm;
+    W.products.read([&](const CondensedStrip& strip) { builder.measure(scaled(strip)); });
+    if (first) builder.agree();
+    W.products.read([&](const CondensedStrip& strip) { builder.collect(scaled(strip)); });
+    if (first) op.near_ = builder.finish();
+  }
+  else
+  {
+    const std::size_t rows = PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs));
+    W.products.read(
+        [&](const CondensedStrip& strip)
+        {
+          const CondensedStrip now = scaled(strip);
+          builder.measure(now);
+          op.append_strips(now);
+        },
+        op.share_columns(rows, comm));
+    builder.agree();
+    op.for_each_strip([&](const CondensedStrip& strip) { builder.collect(strip); });
+    op.near_ = builder.finish();
+  }
+  if (first)
   {
     op.pairs_ = static_cast<std::size_t>(pairs);
     op.directions_ = directions;
     op.set_diagonal(builder.diagonal());
   }
-  op.share_patches();
+  if (op.shared_by_ != MPI_COMM_NULL) op.share_patches();
   return op;
 }
 

@@ -358,7 +358,7 @@ void gauss_seidel(ContactWork& work, const ContactSettings& settings)
     if (is_open()) begin_as_one(work, start);
   }
   if (W.has_near_field() && is_open()) sweep_until_converged<float>(work, one_patch(W), settings);
-  if (!is_open()) return;
+  if (!is_open() || !W.is_stored()) return;
   W.ask_for_whole();
   sweep_until_converged<double>(work, one_patch(W), settings);
 }

@@ -1,6 +1,6 @@
 /// Products that ranks form together. Of a W whose columns they share: y = sum over ranks of what the lower triangle of
-/// their columns and its transpose have in W x. Columns go to ranks by equal parts of the triangle. Whole patches of
-/// the near field go to ranks, for sweeps.
+/// their columns and its transpose have in W x. Columns go to ranks by equal parts of the triangle. Of a W in the
+/// factor: each rank reads its part of the factor. Whole patches of the near field go to ranks, for sweeps.
 #include "gauss_seidel.hpp"
 #include "near_field.hpp"
 #include "squeal/algebra/panel.hpp"
@@ -200,14 +200,14 @@ void ContactOperator::gather() const
 
 void ContactOperator::hold_whole() const
 {
-  if (shared_by_ == MPI_COMM_NULL || held_whole_) return;
+  if (shared_by_ == MPI_COMM_NULL || products_ || held_whole_) return;
   on_rank_zero(shared_by_, [&] { make_place(); });
   gather();
 }
 
 void ContactOperator::ask_for_whole() const
 {
-  if (shared_by_ == MPI_COMM_NULL || held_whole_) return;
+  if (shared_by_ == MPI_COMM_NULL || products_ || held_whole_) return;
   make_place(); // before the others wait for it: there may be none
   int task = task_of_gathering;
   MPI_Bcast(&task, 1, MPI_INT, 0, shared_by_);
@@ -270,6 +270,16 @@ void ContactOperator::multiply_stored(std::vector<double>& x, std::vector<double
   MPI_Reduce(MPI_IN_PLACE, y.data(), to_int(y.size()), MPI_DOUBLE, MPI_SUM, 0, shared_by_);
 }
 
+/// On rank 0.
+void ContactOperator::multiply_by_factor(std::span<const double> x, std::span<double> y) const
+{
+  int task = task_of_product;
+  if (shared_by_ != MPI_COMM_NULL) MPI_Bcast(&task, 1, MPI_INT, 0, shared_by_);
+  const std::vector<double> Ex = products_->products.product(x);
+  const std::vector<double>& added = products_->diagonal;
+  for (std::size_t i = 0; i < y.size(); ++i) y[i] = products_->scale * Ex[i] + (added.empty() ? 0 : added[i] * x[i]);
+}
+
 void ContactOperator::follow_product() const
 {
   int task = 0;
@@ -279,6 +289,11 @@ void ContactOperator::follow_product() const
 
 void ContactOperator::serve_product() const
 {
+  if (products_)
+  {
+    (void)products_->products.product({});
+    return;
+  }
   std::vector<double> x(rows_), y(rows_);
   MPI_Bcast(x.data(), to_int(x.size()), MPI_DOUBLE, 0, shared_by_);
   add_strips(x, y);

@@ -281,8 +281,10 @@ ContactOperator condensed_operator(const ThetaStep& step, const Interface& inter
   const MPI_Comm comm = comm_of(interface.B);
   const auto products = step.factor.condensed_products();
   const auto rows = static_cast<double>(interface.size());
-  if (products && is_worth_sharing(rows, ranks_of(comm)))
-    return make_contact_operator({*products, step.h, added_by_compliance(step, interface)}, interface.pairs,
+  const bool by_factor = products && stays_in_factor(rows, products->entries(), free_memory(comm));
+  if (by_factor || (products && is_worth_sharing(rows, ranks_of(comm))))
+    return make_contact_operator({*products, step.h, added_by_compliance(step, interface)},
+                                 by_factor ? OperatorStorage::by_factor : OperatorStorage::whole, interface.pairs,
                                  interface.directions, comm);
   ContactOperator W;
   std::vector<double> entries = whole_operator(step, interface);

@@ -93,46 +93,53 @@ double largest_difference(const std::vector<double>& a, const std::vector<double
 
 } // namespace
 
-TEST_CASE("a W by columns on all ranks is the whole one in products, blocks, near field and solutions")
+TEST_CASE(
+    "a W in the factor, or by columns on all ranks, is the whole one in products, blocks, near field and solutions")
 {
-  const MPI_Comm comm = PETSC_COMM_WORLD;
-  const test::Rows K = grid_stiffness();
-  constexpr int pairs = side * side / 3; // each has three nodes of the grid's face
-  test::Rows B = test::zeros(3 * pairs, K.size());
-  for (std::size_t i = 0; i < B.size(); ++i) B[i][i] = 1;
-  const auto structure = test::make_structure(K, K, K, std::vector<double>(K.size(), 1.));
-  const auto interface =
-      test::make_interface(B, 2, std::vector<double>(pairs, 0.), std::vector<double>(2 * pairs, 1.), 0.3, structure.K);
-  const Factor factor = factor_held(structure.K, interface, {}, {.kind = FactorKind::supernodal});
-  constexpr double scale = 2.5;
-  std::vector<double> added(B.size(), 0.);
-  for (std::size_t i = 0; i < added.size(); i += 6) added[i] = 0.3;
-  std::vector<double> entries = factor.condensed(scale);
-  for (std::size_t i = 0; i < added.size() && !entries.empty(); ++i) entries[i * added.size() + i] += added[i];
-  const auto products = factor.condensed_products();
-  REQUIRE(products);
-  const ContactOperator W = make_contact_operator({*products, scale, added}, pairs, 2, comm);
-  W.hold_whole();
-  CHECK(largest_difference({W.entries().begin(), W.entries().end()}, entries) < 1e-13);
-  const ServedProducts served(W);
-  if (rank_of(comm) != 0) return;
-  const ContactOperator whole = make_contact_operator(std::move(entries), pairs, 2);
-  CHECK(W.size() == whole.size());
-  CHECK(W.has_near_field());
-  CHECK(W.near_share() == whole.near_share());
-  CHECK(W.near_share() < 0.9);
-  for (std::size_t pair = 0; pair < W.pairs(); ++pair)
-    for (std::size_t k = 0; k < 3; ++k)
-      for (std::size_t l = 0; l < 3; ++l) CHECK(std::abs(W.diagonal(pair)[k][l] - whole.diagonal(pair)[k][l]) < 1e-13);
-  std::vector<double> x(W.size());
-  for (std::size_t i = 0; i < x.size(); ++i) x[i] = std::sin(static_cast<double>(i));
-  CHECK(largest_difference(product(W, x), product(whole, x)) < 1e-12);
-  std::vector<double> b(W.size()), r, r_whole, r_fixed;
-  for (std::size_t i = 0; i < b.size(); ++i)
-    b[i] = i % 3 == 0 ? -0.5 + std::cos(0.7 * static_cast<double>(i)) : std::sin(0.3 * static_cast<double>(i));
-  CHECK(test::solve_contact(W, b, {0.4}, {}, r).converged);
-  CHECK(test::solve_contact(whole, b, {0.4}, {}, r_whole).converged);
-  CHECK(test::solve_contact(W, b, {0.4}, {ContactSolver::fixed_point, 1e-11, 20000, 0}, r_fixed).converged);
-  CHECK(largest_difference(r, r_whole) < 1e-8); // residuals of 1e-10 at reactions near 1 and a condition below 20
-  CHECK(largest_difference(r, r_fixed) < 1e-8);
+  for (const OperatorStorage storage : {OperatorStorage::by_factor, OperatorStorage::whole})
+  {
+    const MPI_Comm comm = PETSC_COMM_WORLD;
+    const test::Rows K = grid_stiffness();
+    constexpr int pairs = side * side / 3; // each has three nodes of the grid's face
+    test::Rows B = test::zeros(3 * pairs, K.size());
+    for (std::size_t i = 0; i < B.size(); ++i) B[i][i] = 1;
+    const auto structure = test::make_structure(K, K, K, std::vector<double>(K.size(), 1.));
+    const auto interface = test::make_interface(B, 2, std::vector<double>(pairs, 0.),
+                                                std::vector<double>(2 * pairs, 1.), 0.3, structure.K);
+    const Factor factor = factor_held(structure.K, interface, {}, {.kind = FactorKind::supernodal});
+    constexpr double scale = 2.5;
+    std::vector<double> added(B.size(), 0.);
+    for (std::size_t i = 0; i < added.size(); i += 6) added[i] = 0.3;
+    std::vector<double> entries = factor.condensed(scale);
+    for (std::size_t i = 0; i < added.size() && !entries.empty(); ++i) entries[i * added.size() + i] += added[i];
+    const auto products = factor.condensed_products();
+    REQUIRE(products);
+    const ContactOperator W = make_contact_operator({*products, scale, added}, storage, pairs, 2, comm);
+    CHECK(W.is_stored() == (storage == OperatorStorage::whole));
+    if (W.is_stored()) W.hold_whole();
+    if (W.is_stored()) CHECK(largest_difference({W.entries().begin(), W.entries().end()}, entries) < 1e-13);
+    const ServedProducts served(W);
+    if (rank_of(comm) != 0) continue;
+    const ContactOperator whole = make_contact_operator(std::move(entries), pairs, 2);
+    CHECK(whole.is_stored());
+    CHECK(W.size() == whole.size());
+    CHECK(W.has_near_field());
+    CHECK(W.near_share() == whole.near_share());
+    CHECK(W.near_share() < 0.9);
+    for (std::size_t pair = 0; pair < W.pairs(); ++pair)
+      for (std::size_t k = 0; k < 3; ++k)
+        for (std::size_t l = 0; l < 3; ++l)
+          CHECK(std::abs(W.diagonal(pair)[k][l] - whole.diagonal(pair)[k][l]) < 1e-13);
+    std::vector<double> x(W.size());
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] = std::sin(static_cast<double>(i));
+    CHECK(largest_difference(product(W, x), product(whole, x)) < 1e-12);
+    std::vector<double> b(W.size()), r, r_whole, r_fixed;
+    for (std::size_t i = 0; i < b.size(); ++i)
+      b[i] = i % 3 == 0 ? -0.5 + std::cos(0.7 * static_cast<double>(i)) : std::sin(0.3 * static_cast<double>(i));
+    CHECK(test::solve_contact(W, b, {0.4}, {}, r).converged);
+    CHECK(test::solve_contact(whole, b, {0.4}, {}, r_whole).converged);
+    CHECK(test::solve_contact(W, b, {0.4}, {ContactSolver::fixed_point, 1e-11, 20000, 0}, r_fixed).converged);
+    CHECK(largest_difference(r, r_whole) < 1e-8); // residuals of 1e-10 at reactions near 1 and a condition below 20
+    CHECK(largest_difference(r, r_fixed) < 1e-8);
+  }
 }

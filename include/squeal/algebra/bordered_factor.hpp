@@ -105,6 +105,12 @@ public:
   /// Rows of B.
   int size() const;
 
+  /// Numbers of E that a product reads, on all ranks.
+  double entries() const;
+
+  /// The product with x, which is read on rank 0; given there.
+  std::vector<double> product(std::span<const double> x) const;
+
   /// Columns that strips do not part, but for the last ones: whole pairs of two or three rows, and whole tiles.
   static constexpr std::size_t together = 24;
 

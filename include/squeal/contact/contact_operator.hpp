@@ -3,7 +3,8 @@
 /// How it is stored is known to this type alone: solvers use its products, the blocks of its diagonal, and its rows
 /// added up pair by pair.
 ///
-/// Its lower triangle is stored by columns, of which each rank has a share; one rank alone has all of W.
+/// Its lower triangle is stored by columns, of which each rank has a share; one rank alone has all of W. Or it stays in
+/// the factor of A as W = scale E E' (section 8.1): a product then reads the rows of E, which all ranks hold a part of.
 ///
 /// The near field (section 4.7) holds the blocks that matter during sweeps, in single precision. Of a row it lacks the
 /// smallest ones, whose sizes add up to a hundredth of the pair's own block. What it leaves out is met by a product
@@ -22,7 +23,7 @@
 namespace squeal
 {
 
-/// scale E E' plus a diagonal matrix, from the rows of E that the factor holds.
+/// scale E E' plus a diagonal matrix, by products that the factor forms.
 struct ScaledProducts
 {
   CondensedProducts products;
@@ -52,7 +53,18 @@ struct NearField
   std::size_t entries() const;
 };
 
-/// On rank 0. The ranks form products together where the columns of W are on all of them. There each
+/// Where W is stored: by its entries, or in the factor.
+enum class OperatorStorage
+{
+  whole,
+  by_factor,
+};
+
+/// Whether a product with a W of so many rows reads fewer numbers by the factor, whose rows of E have so many entries,
+/// or a whole W would take more than a quarter of the memory that is `free` [bytes].
+bool stays_in_factor(double rows, double border_entries, double free);
+
+/// On rank 0. The ranks form products together where W is in the factor, or its columns are on all of them. There each
 /// rank has some patches of the near field besides, where there are several, and the blocks of the diagonal.
 class ContactOperator
 {
@@ -69,6 +81,9 @@ public:
 
   /// y = W x
   void multiply(std::span<const double> x, std::span<double> y) const;
+
+  /// Whether all entries are stored, on rank 0 or on all that share them; the same on all ranks.
+  bool is_stored() const { return !products_; }
 
   /// Gathers shared entries on rank 0, which keeps them all besides. hold_whole: collective. ask_for_whole: of rank 0,
   /// while the others are within ServedProducts.
@@ -113,7 +128,8 @@ public:
 private:
   friend class ServedProducts;
   friend ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
-  friend ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int directions, MPI_Comm comm);
+  friend ContactOperator make_contact_operator(const ScaledProducts& W, OperatorStorage storage, int pairs,
+                                               int directions, MPI_Comm comm);
 
   /// Strips of a few columns of the lower triangle, one after the other, from each strip's first row on.
   struct Strips
@@ -124,6 +140,7 @@ private:
 
   void set_diagonal(std::vector<PairBlock> blocks);
   void multiply_stored(std::vector<double>& x, std::vector<double>& y) const;
+  void multiply_by_factor(std::span<const double> x, std::span<double> y) const;
   void add_strips(const std::vector<double>& x, std::vector<double>& y) const;
   void for_each_strip(const std::function<void(const CondensedStrip&)>& work) const;
   std::vector<std::size_t> share_columns(std::size_t rows, MPI_Comm comm);
@@ -135,7 +152,8 @@ private:
 
   std::size_t pairs_ = 0;
   int directions_ = 0;
-  mutable std::vector<double> values_; // by rows, where rank 0 has all of them
+  mutable std::vector<double> values_;     // by rows, where rank 0 has all of them
+  std::optional<ScaledProducts> products_; // the same on all ranks; none: entries are stored
   std::vector<PairBlock> diagonal_;
   std::vector<NaturalScale> scale_;
   NearField near_;                         // empty: W is small; on other ranks the rows of their patches, inside
@@ -167,8 +185,10 @@ ContactOperator make_contact_operator(std::vector<double> W, int pairs, int dire
 /// Whether ranks share an operator of so many rows: reading less takes no longer than two messages.
 bool is_worth_sharing(double rows, int ranks);
 
-/// From the factor's rows, strip by strip; each rank stores a share: is_worth_sharing. Collective.
-ContactOperator make_contact_operator(const ScaledProducts& W, int pairs, int directions, MPI_Comm comm);
+/// From products with the factor's rows, strip by strip. by_factor: the near field reads them twice, and W stays in the
+/// factor. whole: each rank stores a share; is_worth_sharing. Collective.
+ContactOperator make_contact_operator(const ScaledProducts& W, OperatorStorage storage, int pairs, int directions,
+                                      MPI_Comm comm);
 
 /// target += sum of factors[k] row_k over the rows of one pair (1 to 3), `length` long, one after the other. Arithmetic
 /// of one rank.
