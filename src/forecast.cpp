@@ -24,10 +24,10 @@ constexpr double seconds_of_calls = 2.5e-5;                        // a step of 
 constexpr double operations_a_second = 3e10, bytes_a_second = 8e9; // of a usual core while all work
 constexpr double day = 86400;                                      // [s]
 constexpr double dense_copies = 24; // of n x n numbers in a dense quadratic problem: a pencil of size 2 n, six times
-// A slice takes about 100 pairs with their guards, and passes append two directions a pair. So V has 300 columns on
-// the brake; with its products, a copy while it grows, shapes, residuals and three right sides of a solve:
-constexpr double vectors_of_modes = 4 * 300 + 300 + 200 + 200 + 300;
-constexpr double vectors_of_modes_kept = 200; // of the same 100 pairs
+// A slice takes about 150 pairs with their neighbours, and passes append two directions a pair. So V has 500 columns;
+// with a copy while it grows, and residuals, images and right sides of a pass:
+constexpr double vectors_of_modes = 2 * 500 + 300;
+constexpr double vectors_of_modes_kept = 200; // of 100 pairs
 constexpr double vectors_of_shooting = 100;   // pairs of differences, work of a step, columns of the multipliers
 // A basis grows beyond its limit by what one pass adds; with it its copy while it grows, and the random vectors:
 constexpr double passes_of_response = 40;
@@ -121,13 +121,12 @@ double memory_of_equilibrium(const Sizes& sizes)
 }
 
 /// Six matrices: M and K of the frictionless problem, M, C and K of the sliding one, and C with friction. The pencil of
-/// the search, which is made when that of the count, half as large, is gone. The vectors: the largest subspace of a
-/// slice, and its products with M, C and K.
-double memory_of_modes(const Sizes& sizes, const ModesSettings& settings, const ModesOptions& options, MPI_Comm comm)
+/// the search, L U of twice the size of L D L', which is made when that of the count is gone. The vectors: the largest
+/// subspace of a slice.
+double memory_of_modes(const Sizes& sizes, const ModesOptions& options, MPI_Comm comm)
 {
   if (sizes.dofs <= static_cast<double>(options.dense_limit)) return dense_copies * number * sizes.dofs * sizes.dofs;
-  const Symmetry search = settings.method == ModesMethod::projection ? Symmetry::symmetric : Symmetry::none;
-  return 6 * matrix_entry * sizes.entries + forecast_pencil(sizes.factor, sizes.entries, search, options.pencil, comm) +
+  return 6 * matrix_entry * sizes.entries + 2 * forecast_pencil(sizes.factor, sizes.entries, options.pencil, comm) +
          number * vectors_of_modes * sizes.dofs;
 }
 
@@ -139,8 +138,7 @@ double memory_of_response(const Sizes& sizes, const Scene& scene, const ProgramO
                read = static_cast<double>(scene.probes.size());
   const double pairs = (driven > 0 ? driven : read) * read;
   const double shapes = std::min(sizes.dofs, static_cast<double>(options.response.shapes) + passes_of_response);
-  return 8 * matrix_entry * sizes.entries +
-         forecast_pencil(sizes.factor, sizes.entries, Symmetry::none, options.modes.pencil, comm) +
+  return 8 * matrix_entry * sizes.entries + forecast_pencil(sizes.factor, sizes.entries, options.modes.pencil, comm) +
          number * (2 * shapes + passes_of_response) * sizes.dofs +
          3 * 2 * number * sizes.ranks * pairs * scene.response->count;
 }
@@ -217,7 +215,7 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   forecast.factor_seconds = sizes.factor.operations / operations_a_second;
   const auto add = [&](Stage stage, double bytes) { forecast.stages.push_back({stage, forecast.held + bytes}); };
   add(Stage::equilibrium, memory_of_equilibrium(sizes));
-  if (seeks_modes(scene)) add(Stage::modes, memory_of_modes(sizes, scene.modes, options.modes, comm));
+  if (seeks_modes(scene)) add(Stage::modes, memory_of_modes(sizes, options.modes, comm));
   if (scene.response) add(Stage::response, memory_of_response(sizes, scene, options, comm));
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)

@@ -1,8 +1,9 @@
 #include "squeal/mesh_error.hpp"
 
+#include "squeal/algebra/shift_invert.hpp"
 #include "squeal/base/packed.hpp"
 #include "squeal/forecast.hpp"
-#include "squeal/modes/projection.hpp"
+#include "squeal/modes/passes.hpp"
 #include "squeal/reduction/sliding_basis.hpp"
 
 #include <algorithm>
@@ -85,7 +86,6 @@ private:
 /// A part of the finer problem.
 struct FinerProblem
 {
-  const LinearisedSliding& linearised;
   QuadraticProblem matrices;
   Owned<Mat> K_loss;
   ShiftInvert pencil;
@@ -96,12 +96,16 @@ ModeOnFinerMesh find_finer(FinerProblem& problem, std::complex<double> lambda, c
 {
   constexpr double beside = 1e-4, lowest = 0.7, highest = 1.4; // of the frequency
   constexpr int passes = 30;
-  constexpr PetscInt pairs = 6; // whichever of them friction mixes
+  constexpr std::size_t pairs = 6; // whichever of them friction mixes
   const double square = std::norm(lambda);
   move_to(problem.pencil, (1 + beside) * square);
-  const Correction correction{{lowest * lowest * square, highest * highest * square}, passes, pairs, 1e-12, 1e-13, 0};
   const QuadraticSolution found =
-      solve_on_subspace(problem.matrices, problem.K_loss, start, *problem.pencil.factor, correction);
+      solve_on_subspace(problem.matrices, problem.K_loss, start, problem.pencil.factor.get(),
+                        {.window = {lowest * lowest * square, highest * highest * square},
+                         .passes = passes,
+                         .pairs = pairs,
+                         .tolerance = 1e-12,
+                         .sharp = 1e-13});
   ModeOnFinerMesh result{lambda, {}, std::nan("")};
   double best = 0;
   for (const Eigenpair& pair : found.pairs)
@@ -133,9 +137,8 @@ MeshError on_finer_model(const SlidingPoint& point, const Model& fine, const Pro
   if (equilibrium.outcome.kind != OutcomeKind::converged) return result;
   const LinearisedSliding linearised = linearise({fine.structure, fine.interface, equilibrium});
   const ClosedContact& contact = linearised.contact;
-  FinerProblem problem{linearised, sliding_problem(fine.structure, linearised), {}, {}};
-  if (fine.structure.K_loss.get()) problem.K_loss = project(fine.structure.K_loss, contact.Y, contact.Z);
-  problem.pencil = make_shift_invert(problem.matrices.K, problem.matrices.M, Symmetry::none, options.modes.pencil);
+  FinerProblem problem{sliding_problem(fine.structure, linearised), sliding_loss(fine.structure, linearised),
+                       make_shift_invert(linearised.K_z, linearised.M_z, Keep::factor, options.modes.pencil)};
   const Prolongation prolong(*point.model, fine);
   if (!prolong.is_nested()) return skipped("gmsh made another mesh of the geometry the second time");
   result.outcome = {OutcomeKind::converged, "", 0, 0};

@@ -42,8 +42,6 @@ SceneKeys options_of(ProgramOptions& options)
       {"-factor_limit", &options.factor.limit, "GB",
        "[GB] largest share of a rank in a supernodal factor; beyond it several ranks take MUMPS; -1: half of the free "
        "memory. Every run prints its choice, with what is foreseen"},
-      {"-modes_solver", choice_of(options.modes.solver), "word",
-       "solver of larger problems: slices of frequency, or SLEPc's TOAR around zero (toar)"},
       {"-modes_shapes", choice_of(options.modes.shapes), "word",
        "modes whose shapes fields.h5 holds: the unstable ones, or all"},
       {"-transient_refuse", &options.step.refuse, "switch",

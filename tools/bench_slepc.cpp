@@ -3,8 +3,7 @@
 ///     bench_slepc SCENE band rounds [key=value …]
 /// All alternate in every round; figures are medians of processor seconds. SLEPc's factors are MUMPS's.
 ///     real modes: around one shift by squeal, beside spectrum slicing (EPSSetInterval);
-///     subspace:   of the undamped problem with friction, around the band's middle: the start of a slice;
-///     quadratic:  TOAR, shift-inverted near zero, as -modes_solver toar asks for it.
+///     quadratic:  TOAR, shift-inverted near zero, as modes.method = "toar" asks for it.
 /// -bench_real_only leaves out all but the real modes.
 /// -bench_write FOLDER writes M, C, K of the quadratic problem and the sizes |lambda| of its pairs, for another solver.
 #include "bench_timing.hpp"
@@ -12,8 +11,8 @@
 #include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/model.hpp"
+#include "squeal/modes/pair_search.hpp"
 #include "squeal/modes/real_modes.hpp"
-#include "squeal/modes/slices.hpp"
 #include "squeal/scene/scene.hpp"
 
 #include <cmath>
@@ -141,81 +140,20 @@ Answer real_modes_by_squeal(const Problem& problem, double band)
   return {static_cast<int>(modes.omega.size()), modes.outcome.residual, processor_time() - start};
 }
 
-/// The eigenvalues theta of K x = theta M x with friction, which a slice of the whole band starts from: the number of
-/// those with sqrt(|theta|) below omega. `search` gets the middle of the band, how many there are without friction and
-/// how far the band reaches.
-template <class Search> Answer subspace_by(const Search& search, const Problem& problem, double omega)
+PairSearch search(const Problem& problem, ModesMethod method, double band)
 {
-  const double start = processor_time(), limit = omega * omega;
-  RealCount real = make_real_count(problem.M, problem.K, large);
-  const std::vector<std::complex<double>> theta = search(limit / 2, count_below(real, omega), 1.06 * limit / 2);
-  return {static_cast<int>(
-              std::count_if(theta.begin(), theta.end(), [&](std::complex<double> t) { return std::abs(t) < limit; })),
-          0, processor_time() - start};
+  return search_pairs({problem.quadratic, nullptr, problem.M, problem.K}, method, band, large);
 }
 
-std::vector<std::complex<double>> theta_by_squeal(const Problem& problem, double middle, int count, double radius)
-{
-  ShiftInvert pencil = make_shift_invert(problem.quadratic.K, problem.quadratic.M, Symmetry::none, {});
-  move_to(pencil, middle);
-  return solve_nearest(pencil, count, radius, 1e-9).theta;
-}
-
-/// More are sought until one lies beyond the radius.
-std::vector<std::complex<double>> theta_by_slepc(const Problem& problem, double middle, int count, double radius)
-{
-  std::vector<std::complex<double>> theta;
-  EPS eps = nullptr;
-  check(EPSCreate(PETSC_COMM_WORLD, &eps));
-  check(EPSSetOperators(eps, problem.quadratic.K, problem.quadratic.M));
-  check(EPSSetProblemType(eps, EPS_GNHEP));
-  check(EPSSetType(eps, EPSKRYLOVSCHUR));
-  check(EPSSetTolerances(eps, 1e-9, 200));
-  check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
-  check(EPSSetTarget(eps, middle));
-  ST transformation = nullptr;
-  check(EPSGetST(eps, &transformation));
-  use_mumps(transformation);
-  check(EPSSetOptionsPrefix(eps, "bench_"));
-  check(EPSSetFromOptions(eps));
-  for (double farthest = 0; farthest < radius; count += count / 2)
-  {
-    check(EPSSetDimensions(eps, count + 1, PETSC_DEFAULT, PETSC_DEFAULT));
-    check(EPSSolve(eps));
-    PetscInt converged = 0;
-    check(EPSGetConverged(eps, &converged));
-    theta.assign(static_cast<std::size_t>(converged), 0);
-    for (PetscInt i = 0; i < converged; ++i)
-    {
-      double real = 0, imaginary = 0;
-      check(EPSGetEigenvalue(eps, i, &real, &imaginary));
-      theta[static_cast<std::size_t>(i)] = {real, imaginary};
-      farthest = std::max(farthest, std::hypot(real - middle, imaginary));
-    }
-  }
-  check(EPSDestroy(&eps));
-  return theta;
-}
-
-Answer pairs_by_slices(const Problem& problem, double band)
+Answer pairs_by(ModesMethod method, const Problem& problem, double band)
 {
   const double start = processor_time();
-  RealCount real = make_real_count(problem.M, problem.K, large);
-  const CountedSolution result = solve_by_slices(problem.quadratic, real, band, {});
+  const PairSearch result = search(problem, method, band);
   const double limit = two_pi * band;
   const auto& pairs = result.solution.pairs;
   return {static_cast<int>(std::count_if(pairs.begin(), pairs.end(),
                                          [&](const Eigenpair& p) { return std::abs(p.lambda) < limit; })),
           result.solution.outcome.residual, processor_time() - start};
-}
-
-Answer pairs_by_toar(const Problem& problem, double band)
-{
-  const double start = processor_time(), end = two_pi * band;
-  RealCount real = make_real_count(problem.M, problem.K, large);
-  const QuadraticSolution solution = solve_quadratic(
-      problem.quadratic, {band, std::sqrt(-shift_below_zero(problem.M, problem.K)) / end, count_below(real, end), 0});
-  return {static_cast<int>(solution.pairs.size()), solution.outcome.residual, processor_time() - start};
 }
 
 /// K.petsc, C.petsc, M.petsc, and pairs.txt: |lambda| of the pairs, one a line, ascending.
@@ -229,9 +167,8 @@ void write_problem(const Problem& problem, double band, const std::filesystem::p
     check(PetscViewerBinaryOpen(PETSC_COMM_WORLD, (folder / name).c_str(), FILE_MODE_WRITE, viewer.put()));
     check(MatView(matrix, viewer));
   }
-  RealCount real = make_real_count(problem.M, problem.K, large);
   std::vector<double> sizes;
-  for (const Eigenpair& pair : solve_by_slices(problem.quadratic, real, band, {}).solution.pairs)
+  for (const Eigenpair& pair : search(problem, ModesMethod::full, band).solution.pairs)
     if (std::abs(pair.lambda) < two_pi * band) sizes.push_back(std::abs(pair.lambda));
   std::sort(sizes.begin(), sizes.end());
   std::ofstream file(folder / "pairs.txt");
@@ -266,11 +203,8 @@ void run(int argc, char** argv)
     note("real modes", real_modes_by_squeal(problem, band));
     note("interval", real_modes_by_slicing(problem, omega * omega, subspace));
     if (real_only) continue;
-    note("subspace", subspace_by([&](auto... what) { return theta_by_squeal(problem, what...); }, problem, omega));
-    note("subspace, Krylov-Schur",
-         subspace_by([&](auto... what) { return theta_by_slepc(problem, what...); }, problem, omega));
-    note("slices", pairs_by_slices(problem, band));
-    note("TOAR", pairs_by_toar(problem, band));
+    note("slices", pairs_by(ModesMethod::full, problem, band));
+    note("TOAR", pairs_by(ModesMethod::toar, problem, band));
   }
   PetscInt size = 0;
   check(MatGetSize(problem.K, &size, nullptr));

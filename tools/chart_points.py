@@ -11,7 +11,7 @@ from squeal.common import BLUE, GREEN, GREY, ORANGE, RED
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
-ENERGY, PERIOD, GROWTH = "mean fluctuating energy", "period", "growth rate"
+ENERGY, PERIOD = "mean fluctuating energy", "period"
 
 
 class Point:
@@ -99,25 +99,6 @@ def methods(runs, judge):
         Line("fidelity = auto, accuracy {}", [point(f"auto_{value:.0e}", tidy(f"{value:.0e}")) for value in a.accuracies], RED, "^"),
     ]
     return [line for line in lines if line.points]
-
-
-def projections(runs):
-    """Lines of the growth rate by projection, one for each number of passes, and the full problem's point."""
-    full = runs.report("modes_full")
-    if not full:
-        return [], None
-    true = full["modes"]["modes"][0]
-
-    def point(report, label):
-        near = min(report["modes"]["modes"], key=lambda mode: abs(mode["frequency_hz"] - true["frequency_hz"]))
-        return Point(report["processor_seconds"]["modes"], {GROWTH: near["growth_rate"]}, label=label)
-
-    lines = []
-    for passes, shade in enumerate(matplotlib.colormaps["Blues"](np.linspace(0.35, 1, 4))):
-        found = {n: runs.report(f"modes_{n}_{passes}") for n in runs.a.real_modes}
-        points = [point(report, str(n)) for n, report in found.items() if report and report["modes"].get("modes")]
-        lines.append(Line(f"projection on {{}} real modes, {passes} pass{'' if passes == 1 else 'es'}", points, shade, "o"))
-    return [line for line in lines if line.points], point(full, "")
 
 
 def front(lines, judge, what, cost):

@@ -12,10 +12,6 @@ CYCLES = ("converged", "not converged")  # outcomes that have a cycle
 def growth_cases(a):
     rest = {"cycle.enabled": "false", "transient.enabled": "false"}
     cases = {"modes_full": ({**rest, "modes.method": "full"}, [])}
-    for passes in range(4):
-        for n in a.real_modes:
-            cases[f"modes_{n}_{passes}"] = ({**rest, "modes.method": "projection", "modes.real_modes": n,
-                                             "modes.residual_passes": passes}, [])
     marched = {"cycle.enabled": "false", "transient.enabled": "true", "transient.start": "mode", "transient.periods": 2}
     for n in a.steps:
         cases[f"growth_{n}"] = ({**marched, "transient.steps_per_period": n}, [])

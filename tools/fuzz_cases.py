@@ -157,7 +157,7 @@ def scenes(folder, random):
 
 def overrides(folder, random):
     random.choice([write_points, write_bar])(folder)
-    keys = ["friction.coefficient", "contact.0.gap", "contact.0.velocity", "modes.band", "modes.real_modes", "cycle.steps_per_period",
+    keys = ["friction.coefficient", "contact.0.gap", "contact.0.velocity", "modes.band", "cycle.steps_per_period",
             "cycle.tolerance", "transient.periods", "transient.start", "part.bar.young", "mesh.scale", "mesh.file", "force.0.vector.2",
             "probe.0.name", "spring.0.stiffness", "title", "fidelity", "accuracy", "branch.key", "cycle.starts", "a.b.c", "", ".", "..",
             "part", "contact", "point.pad.mass", "cycle.save_state", "transient.save_state", "support.0.fixed", "é", "x" * 1000]

@@ -89,21 +89,19 @@ double operations_of(const SymbolicFactor& symbolic)
 FactorForecast multifrontal_forecast(const SymbolicFactor& symbolic)
 {
   FactorForecast forecast;
-  double waiting = 0, symmetric = 0, not_symmetric = 0;
+  double waiting = 0, symmetric = 0;
   const auto square = [](double x) { return x * x; };
   for (const Supernode& supernode : symbolic.supernodes)
   {
     const double columns = supernode.columns, inner = supernode.inner();
     const double front = square(columns + inner);
     forecast.symmetric = std::max(forecast.symmetric, symmetric + waiting + front);
-    forecast.not_symmetric = std::max(forecast.not_symmetric, not_symmetric + waiting + front);
     for (const int child : supernode.children)
       waiting -= square(symbolic.supernodes[static_cast<std::size_t>(child)].inner());
     waiting += square(inner);
     symmetric += columns * (columns + inner);
     forecast.entries += columns * ((columns + 1) / 2 + inner);
     forecast.border_entries += columns * supernode.border;
-    not_symmetric += columns * (columns + 2 * inner);
   }
   return forecast;
 }

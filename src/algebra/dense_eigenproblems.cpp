@@ -42,21 +42,6 @@ template <class Complexes> lapack_complex_double* entries_of(Complexes& A)
   return reinterpret_cast<lapack_complex_double*>(A.data());
 }
 
-/// Reorders a Schur form by LAPACK's trsen, since Eigen has no such function, and reads the eigenvalues from it.
-bool order_and_read(SchurForm& schur, const std::vector<lapack_logical>& chosen)
-{
-  const int n = to_int(schur.T.rows());
-  VectorXd real(n), imaginary(n), work(std::max(1, n));
-  int count = 0, integers = 0;
-  double condition = 0, separation = 0;
-  const int info = LAPACKE_dtrsen_work(LAPACK_COL_MAJOR, 'N', 'V', chosen.data(), n, schur.T.data(), n, schur.Q.data(),
-                                       n, real.data(), imaginary.data(), &count, &condition, &separation, work.data(),
-                                       to_int(work.size()), &integers, 1);
-  schur.eigenvalues.clear();
-  for (Index i = 0; i < n; ++i) schur.eigenvalues.emplace_back(real(i), imaginary(i));
-  return info == 0;
-}
-
 /// Vectors from LAPACK's columns for a real matrix: of conjugates the first one is the real part and the next one the
 /// imaginary part of the vector with Im(mu) > 0.
 MatrixXcd complex_columns(const VectorXcd& mu, const MatrixXd& packed)
@@ -351,22 +336,6 @@ std::vector<std::size_t> nearest_places(const std::vector<std::complex<double>>&
   }
   places.resize(references.size());
   return places;
-}
-
-std::optional<SchurForm> schur_form(const MatrixXd& A)
-{
-  const Eigen::RealSchur<MatrixXd> solver(A);
-  if (solver.info() != Eigen::Success) return std::nullopt;
-  SchurForm schur{solver.matrixT(), solver.matrixU(), {}};
-  order_and_read(schur, std::vector<lapack_logical>(static_cast<std::size_t>(A.rows()), 0));
-  return schur;
-}
-
-bool reorder(SchurForm& schur, const std::function<bool(Complex)>& chosen)
-{
-  std::vector<lapack_logical> marks;
-  for (const Complex eigenvalue : schur.eigenvalues) marks.push_back(chosen(eigenvalue));
-  return order_and_read(schur, marks);
 }
 
 template std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm, const MatrixXd&, const MatrixXd&, const MatrixXd&,

@@ -34,10 +34,9 @@ namespace
 {
 
 /// By the entries of a symmetric factor.
-bool is_made_whole(double entries, Symmetry symmetry, const PencilOptions& options, MPI_Comm comm)
+bool is_made_whole(double entries, const PencilOptions& options, MPI_Comm comm)
 {
-  const double gigabytes = (symmetry == Symmetry::none ? 2 : 1) * entries * sizeof(double) / 1e9;
-  return ranks_of(comm) > 1 && gigabytes <= options.whole_limit;
+  return ranks_of(comm) > 1 && entries * sizeof(double) / 1e9 <= options.whole_limit;
 }
 
 /// The entries of all ranks on every rank.
@@ -108,16 +107,16 @@ EliminationOrder elimination_order(Mat K)
   return order;
 }
 
-PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options, const EliminationOrder* known)
+PencilFactor::PencilFactor(Mat K, Mat M, Keep keep, const PencilOptions& options, const EliminationOrder* known)
     : parts_(std::make_unique<Parts>())
 {
   Parts& parts = *parts_;
   parts.comm = comm_of(K);
   parts.layout = row_layout(K);
-  const bool symmetric = symmetry != Symmetry::none;
+  const bool symmetric = keep != Keep::lu;
   const EliminationOrder made = known ? EliminationOrder{} : elimination_order(K), &order = known ? *known : made;
   std::vector<MUMPS_INT> positions(order.position.begin(), order.position.end());
-  parts.whole = is_made_whole(order.entries, symmetry, options, parts.comm);
+  parts.whole = is_made_whole(order.entries, options, parts.comm);
   const auto entries_of = [&](Mat A)
   {
     Triplets own = symmetric ? lower_triangle(A) : Triplets{};
@@ -132,7 +131,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
   parts.K = std::move(entries.value); // MUMPS's pointer to them stays valid
   DMUMPS_STRUC_C& mumps = *parts.mumps;
   control(mumps, 14) = to_int(options.room);
-  if (symmetry == Symmetry::counted) control(mumps, 31) = 1; // the factor is discarded, front by front
+  if (keep == Keep::count) control(mumps, 31) = 1; // the factor is discarded, front by front
   set_controls_from_options(mumps, "modes_");
   mumps.perm_in = positions.data();
   parts.run_together([&] { run(mumps, MumpsJob::analyse); });
@@ -141,16 +140,12 @@ PencilFactor::PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions&
 
 PencilFactor::~PencilFactor() = default;
 
-double forecast_pencil(const FactorForecast& forecast, double entries_of_K, Symmetry symmetry,
-                       const PencilOptions& options, MPI_Comm comm)
+double forecast_pencil(const FactorForecast& forecast, double entries_of_K, const PencilOptions& options, MPI_Comm comm)
 {
-  const bool symmetric = symmetry == Symmetry::symmetric;
   // the place, both entries, K - shift M, and that once more in MUMPS's order
   constexpr double an_entry = 2 * sizeof(int) + 3 * sizeof(double) + sizeof(double) + sizeof(MUMPS_INT);
-  const double entries = (symmetric ? 0.5 : 1) * entries_of_K; // the lower half, or all
-  const double numbers = symmetric ? forecast.symmetric : forecast.not_symmetric;
-  const double copies = is_made_whole(forecast.entries, symmetry, options, comm) ? ranks_of(comm) : 1;
-  return copies * (an_entry * entries + sizeof(double) * numbers);
+  const double copies = is_made_whole(forecast.entries, options, comm) ? ranks_of(comm) : 1;
+  return copies * (an_entry * entries_of_K / 2 + sizeof(double) * forecast.symmetric); // the lower half
 }
 
 bool PencilFactor::factorise(double shift)
@@ -172,20 +167,7 @@ int PencilFactor::negative_pivots() const
 
 MultiVector PencilFactor::solve(const MultiVector& X) const
 {
-  constexpr MUMPS_INT as_it_is = 1;
-  control(*parts_->mumps, 9) = as_it_is;
-  return solve_with(*parts_, X);
-}
-
-MultiVector PencilFactor::solve_transposed(const MultiVector& X) const
-{
-  constexpr MUMPS_INT transposed = 0;
-  control(*parts_->mumps, 9) = transposed;
-  return solve_with(*parts_, X);
-}
-
-MultiVector PencilFactor::solve_with(Parts& parts, const MultiVector& X)
-{
+  Parts& parts = *parts_;
   MultiVector Y = X;
   if (X.columns() == 0) return Y;
   control(*parts.mumps, 27) = to_int(X.columns()); // all of them at each reading of the factor

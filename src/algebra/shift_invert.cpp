@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 namespace squeal
 {
@@ -16,7 +15,6 @@ namespace squeal
 namespace
 {
 
-using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
@@ -45,12 +43,11 @@ void grow(Krylov& krylov, const ShiftInvert& pencil)
   krylov.H.rightCols(size - order) << inside, inner_products(columns_from(V, size), S);
 }
 
-/// The leading columns of a Schur basis of the square part of H, and the residual of their span.
+/// An orthonormal basis of the leading invariant subspace of the square part of H, and the residual of its span.
 struct Leading
 {
-  std::vector<Complex> nu{};  // eigenvalues of (K - shift M)^-1 M, none smaller in modulus than those left out
+  std::vector<double> nu{};   // eigenvalues of (K - shift M)^-1 M, none smaller in modulus than those left out
   MatrixXd Q{};               // order x nu.size(), and columns for guards
-  double next = 0;            // the largest |nu| that was left out
   double residual = HUGE_VAL; // over the smallest |nu|
 };
 
@@ -82,29 +79,20 @@ Leading leading_subspace(const Krylov& krylov, PetscInt count, double least, dou
 {
   const Index order = krylov.order();
   Leading result;
-  result.Q.resize(order, 0);
-  std::optional<SchurForm> schur = schur_form(krylov.H.topRows(order));
-  if (!schur) return result;
+  std::vector<DenseEigenpair> pairs = solve_dense_unsymmetric(krylov.H.topRows(order));
   std::vector<double> descending;
-  for (const Complex nu : schur->eigenvalues) descending.push_back(std::abs(nu));
-  std::sort(descending.rbegin(), descending.rend());
-  const auto down_to = [&](std::size_t taken) { return descending[taken - 1] * (1 - 1e-12); };
-  const auto take = [&](double smallest) // in front, in the order that they have
-  {
-    const auto chosen = [&](Complex nu) { return std::abs(nu) >= smallest; };
-    const auto number = std::ranges::count_if(schur->eigenvalues, chosen);
-    if (!reorder(*schur, chosen)) return false;
-    result.Q = schur->Q.leftCols(number);
-    return true;
+  for (const DenseEigenpair& pair : pairs) descending.push_back(std::abs(pair.lambda));
+  const auto basis = [&](std::size_t taken) {
+    return orthonormal_columns(real_columns({pairs.begin(), pairs.begin() + static_cast<Index>(taken)}, order));
   };
   const std::size_t taken = number_to_take(descending, count, least, 0.5);
-  if (taken == 0 || !take(down_to(taken))) return result;
-  result.nu.assign(schur->eigenvalues.begin(), schur->eigenvalues.begin() + result.Q.cols());
-  result.next = taken < descending.size() ? descending[taken] : 0;
+  if (taken == 0) return result;
+  for (std::size_t k = 0; k < taken; ++k) result.nu.push_back(pairs[k].lambda.real());
+  result.Q = basis(taken);
   const MatrixXd outside = krylov.H.bottomRows(krylov.H.rows() - order) * result.Q;
-  result.residual = std::sqrt(outside.colwise().squaredNorm().maxCoeff()) / down_to(taken);
+  result.residual = std::sqrt(outside.colwise().squaredNorm().maxCoeff()) / descending[taken - 1];
   const auto wider = static_cast<PetscInt>((1 + guards) * static_cast<double>(taken));
-  if (guards > 0) take(down_to(number_to_take(descending, wider, HUGE_VAL, 0.1)));
+  if (guards > 0) result.Q = basis(number_to_take(descending, wider, HUGE_VAL, 0.1));
   return result;
 }
 
@@ -116,7 +104,6 @@ Leading leading_subspace_shared(const Krylov& krylov, PetscInt count, double lea
   on_rank_zero(comm, [&] { leading = leading_subspace(krylov, count, least, guards); });
   broadcast(leading.Q, comm);
   broadcast(leading.nu, comm);
-  MPI_Bcast(&leading.next, 1, MPI_DOUBLE, 0, comm);
   MPI_Bcast(&leading.residual, 1, MPI_DOUBLE, 0, comm);
   return leading;
 }
@@ -135,10 +122,9 @@ void use_mumps(ST transformation)
   check(PCFactorSetMatSolverType(factor, MATSOLVERMUMPS));
 }
 
-ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options,
-                              const EliminationOrder* order)
+ShiftInvert make_shift_invert(Mat K, Mat M, Keep keep, const PencilOptions& options, const EliminationOrder* order)
 {
-  return {K, M, 0, std::make_unique<PencilFactor>(K, M, symmetry, options, order)};
+  return {K, M, 0, std::make_unique<PencilFactor>(K, M, keep, options, order)};
 }
 
 void move_to(ShiftInvert& pencil, double shift)
@@ -169,13 +155,7 @@ Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, 
     const Leading leading = leading_subspace_shared(krylov, count, least, guards);
     result.converged = exhausted || leading.residual < tolerance;
     if (!result.converged) continue;
-    double smallest = leading.next > 0 ? HUGE_VAL : 0; // where nothing is left out the reach is unlimited
-    for (const Complex nu : leading.nu)
-    {
-      result.theta.push_back(pencil.shift + 1.0 / nu);
-      smallest = std::min(smallest, std::abs(nu));
-    }
-    result.reach = 1 / smallest;
+    for (const double nu : leading.nu) result.theta.push_back(pencil.shift + 1 / nu);
     result.space = {krylov.V.comm, krylov.V.entries.leftCols(krylov.order()) * leading.Q};
   }
   return result;

@@ -27,9 +27,7 @@ void need(const Outcome& outcome, const char* what, const BrakeBranchProblem& pr
 /// The modes of the band at an equilibrium of the range.
 Modes modes_at(const SlidingEquilibrium& sliding, const BrakeBranchProblem& problem)
 {
-  ModesSettings settings = problem.modes;
-  if (settings.method != ModesMethod::projection) settings.method = ModesMethod::full; // which decides there
-  return find_modes(sliding, linearise(sliding), settings, problem.modes_options);
+  return find_modes(sliding, linearise(sliding), problem.modes, problem.modes_options);
 }
 
 constexpr std::size_t parts_of_motion = 8; // of the list below, those that motion depends on

@@ -16,12 +16,11 @@ constexpr const char* name_of_search = "modes";
 /// All but the vectors of the modes, of which the numbers alone are set.
 void describe_search(Checkpoint& checkpoint, Modes& modes)
 {
-  std::size_t found = modes.modes.size(), projected = modes.projected.size();
-  describe_all(checkpoint, found, projected, modes.outcome, modes.method, modes.shapes, modes.band, modes.beyond_band,
-               modes.unstable_count, modes.routes_disagree, modes.beyond_inertia, modes.count.certified_by,
-               modes.count.frequency, modes.count.expected, modes.count.found, modes.count_check);
+  std::size_t found = modes.modes.size();
+  describe_all(checkpoint, found, modes.outcome, modes.method, modes.shapes, modes.band, modes.beyond_band,
+               modes.unstable_count, modes.beyond_inertia, modes.count.certified_by, modes.count.frequency,
+               modes.count.expected, modes.count.found, modes.count_check);
   modes.modes.resize(found);
-  modes.projected.resize(projected);
 }
 
 /// Hands each mode with the name of its checkpoint to `pass`: one checkpoint of all might not fit into the memory.
@@ -29,15 +28,14 @@ template <class Pass> void for_each_mode(Modes& modes, const Structure& structur
 {
   const FileOrder order(structure);
   std::size_t number = 0;
-  for (std::vector<ComplexMode>* const list : {&modes.modes, &modes.projected})
-    for (ComplexMode& mode : *list)
-      pass(format("modes.%06zu", number++),
-           [&](Checkpoint& checkpoint)
-           {
-             describe_all(checkpoint, mode.lambda, mode.backward_error, mode.reactions);
-             order.describe(checkpoint, mode.real);
-             order.describe(checkpoint, mode.imaginary);
-           });
+  for (ComplexMode& mode : modes.modes)
+    pass(format("modes.%06zu", number++),
+         [&](Checkpoint& checkpoint)
+         {
+           describe_all(checkpoint, mode.lambda, mode.backward_error, mode.reactions);
+           order.describe(checkpoint, mode.real);
+           order.describe(checkpoint, mode.imaginary);
+         });
 }
 
 } // namespace
@@ -55,12 +53,11 @@ std::optional<Modes> kept_modes(const Structure& structure)
   const MPI_Comm comm = comm_of(structure.load);
   Modes modes;
   if (!restore(name_of_search, comm, [&](Checkpoint& checkpoint) { describe_search(checkpoint, modes); })) return {};
-  for (std::vector<ComplexMode>* const list : {&modes.modes, &modes.projected})
-    for (ComplexMode& mode : *list)
-    {
-      mode.real = zeros_like(structure.load);
-      mode.imaginary = zeros_like(structure.load);
-    }
+  for (ComplexMode& mode : modes.modes)
+  {
+    mode.real = zeros_like(structure.load);
+    mode.imaginary = zeros_like(structure.load);
+  }
   bool all = true;
   for_each_mode(modes, structure,
                 [&](const std::string& name, const Description& describe) { all &= restore(name, comm, describe); });

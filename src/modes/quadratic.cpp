@@ -1,6 +1,5 @@
 #include "squeal/modes/quadratic.hpp"
 
-#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/quadratic_residual.hpp"
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/base/constants.hpp"
@@ -32,28 +31,6 @@ Owned<Mat> scaled(Mat A, double factor)
 {
   Owned<Mat> result = copy_of(A);
   check(MatScale(result, factor));
-  return result;
-}
-
-/// This rank's share of a vector that is whole on every rank.
-Owned<Vec> distributed(const Eigen::VectorXd& whole, Mat layout)
-{
-  Owned<Vec> result;
-  check(MatCreateVecs(layout, nullptr, result.put()));
-  set_all_entries(result, {whole.data(), static_cast<std::size_t>(whole.size())});
-  return result;
-}
-
-/// Of a small problem.
-QuadraticSolution solve_whole(const QuadraticProblem& problem, const Window& window)
-{
-  QuadraticSolution result;
-  result.outcome = {OutcomeKind::converged, "", 1, 0};
-  for (const DenseEigenpair& found : solve_dense_quadratic_shared(comm_of(problem.K), dense_copy(problem.M),
-                                                                  dense_copy(problem.C), dense_copy(problem.K)))
-    if (window.holds(found.lambda))
-      result.pairs.push_back(
-          {found.lambda, distributed(found.y.real(), problem.K), distributed(found.y.imag(), problem.K), 0});
   return result;
 }
 
@@ -123,7 +100,8 @@ double collect(PEP pep, double omega, double shift, const Window& window, std::v
 }
 
 /// By TOAR, with twice as many eigenvalues in each attempt until they reach the end of the band.
-QuadraticSolution solve_large(const QuadraticProblem& problem, const QuadraticSettings& settings, const Window& window)
+QuadraticSolution solve_by_toar(const QuadraticProblem& problem, const QuadraticSettings& settings,
+                                const Window& window)
 {
   PetscInt n = 0;
   check(MatGetSize(problem.K, &n, nullptr));
@@ -163,6 +141,12 @@ Owned<Mat> without_loss(Mat C, const Structure& structure)
   return result;
 }
 
+Owned<Mat> sliding_loss(const Structure& structure, const LinearisedSliding& linearised)
+{
+  if (!structure.K_loss.get()) return {};
+  return project(structure.K_loss, linearised.contact.Y, linearised.contact.Z);
+}
+
 QuadraticProblem sliding_problem(const Structure& structure, const LinearisedSliding& linearised)
 {
   const Mat Y = linearised.contact.Y, Z = linearised.contact.Z;
@@ -179,13 +163,10 @@ bool Window::holds(std::complex<double> lambda) const
 
 QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const QuadraticSettings& settings)
 {
-  PetscInt n = 0;
-  check(MatGetSize(problem.K, &n, nullptr));
   const QuadraticNorms norms = norms_of(problem);
   const double omega = two_pi * settings.band;
   const Window window{vibration_floor(norms), omega * omega};
-  QuadraticSolution result =
-      n <= settings.dense_limit ? solve_whole(problem, window) : solve_large(problem, settings, window);
+  QuadraticSolution result = solve_by_toar(problem, settings, window);
   for (Eigenpair& pair : result.pairs)
   {
     normalise(pair);

@@ -77,29 +77,8 @@ double largest_residual(const RealPairs& pairs, Mat M, Mat K)
   return (column_norms(residual).array() / column_norms(pairs.x).array()).maxCoeff() / stiffness;
 }
 
-/// A limit [1/s2] and the number of eigenvalues below it.
-struct Inertia
-{
-  double limit = 0;
-  int below = 0;
-};
-
-/// Counts at `limit`, or slightly lower where that is an eigenvalue.
-Inertia inertia_at(double limit, ShiftInvert& pencil)
-{
-  move_to(pencil, limit);
-  return {pencil.shift, pencil.factor->negative_pivots()};
-}
-
-ShiftInvert& pencil_of(RealCount& count)
-{
-  if (!count.pencil.factor)
-    count.pencil = make_shift_invert(count.K, count.M, Symmetry::counted, count.options, &order_of(count));
-  return count.pencil;
-}
-
-/// The modes with low <= theta < high, found from the middle, about `expected` of them. Where they are too many for one
-/// space, by halves.
+/// Appends the modes with low <= theta < high, found from the middle, about `expected` of them. Where they are too many
+/// for one space, by halves.
 void append_between(double low, double high, int expected, ShiftInvert& pencil, RealModes& modes)
 {
   constexpr double tolerance = 1e-7; // of the subspace: theta is off by its square
@@ -125,64 +104,65 @@ void append_between(double low, double high, int expected, ShiftInvert& pencil, 
   }
 }
 
+void keep_first(RealModes& modes, std::ptrdiff_t count)
+{
+  modes.omega.erase(modes.omega.begin() + count, modes.omega.end());
+  modes.shapes.erase(modes.shapes.begin() + count, modes.shapes.end());
+}
+
 /// The modes with theta < limit, in slices of equal width in frequency, so many that one holds about `slice` modes: the
 /// work of a slice grows by the square of their number. A mode on an edge may be missed or found twice, which the count
 /// shows: then other edges follow.
-RealModes search_below(double limit, ShiftInvert& pencil)
+RealModes search_below(Mat M, Mat K, double limit, const PencilOptions& options)
 {
   constexpr int slice = 150, attempts = 3;
   constexpr double rounding = 1e-8; // of theta: the inertia says on which side of the limit such a mode lies
-  const Inertia end = inertia_at(limit, pencil);
+  const EliminationOrder order = elimination_order(K);
+  const Inertia end = inertia_at(limit, M, K, options, order);
+  ShiftInvert pencil = make_shift_invert(K, M, Keep::factor, options, &order);
   const int fewest = std::max(1, (end.below + slice - 1) / slice);
   for (int slices = fewest;; ++slices)
   {
     RealModes modes{{OutcomeKind::converged, "", slices, 0}, {}, {}};
     for (int k = 0; k < slices; ++k)
     {
-      const double low = k == 0 ? shift_below_zero(pencil.M, pencil.K) : limit * std::pow(1. * k / slices, 2);
+      const double low = k == 0 ? shift_below_zero(M, K) : limit * std::pow(1. * k / slices, 2);
       const double high = limit * (k + 1 == slices ? 1 + rounding : std::pow((k + 1.) / slices, 2));
       append_between(low, high, end.below / slices, pencil, modes);
     }
     const auto below = [&](double theta)
-    {
-      const auto found = std::lower_bound(modes.omega.begin(), modes.omega.end(), std::sqrt(theta));
-      return static_cast<int>(found - modes.omega.begin());
-    };
+    { return std::ranges::lower_bound(modes.omega, std::sqrt(theta)) - modes.omega.begin(); };
     const bool counted =
         below(end.limit * (1 - rounding)) <= end.below && end.below <= below(end.limit * (1 + rounding));
     if (!counted && slices + 1 < fewest + attempts) continue;
     if (!counted)
     {
       modes.outcome.kind = OutcomeKind::not_converged;
-      modes.outcome.reason = format("%d real modes found, and the inertia counts %d", below(end.limit), end.below);
+      modes.outcome.reason = format("%td real modes found, and the inertia counts %d", below(end.limit), end.below);
     }
-    const int kept = counted && end.limit == limit ? end.below : below(limit);
-    modes.omega.resize(static_cast<std::size_t>(kept));
-    modes.shapes.erase(modes.shapes.begin() + kept, modes.shapes.end());
+    keep_first(modes, counted && end.limit == limit ? end.below : below(limit));
     return modes;
   }
 }
 
 /// The first `count` modes, below a limit that the nearest theta to the end of the spectrum give.
-RealModes search_first(PetscInt count, ShiftInvert& pencil)
+RealModes search_first(Mat M, Mat K, PetscInt count, const PencilOptions& options)
 {
   constexpr double rough = 1e-4; // of theta
-  const double shift = shift_below_zero(pencil.M, pencil.K);
-  move_to(pencil, shift);
-  const Nearest nearest = solve_nearest(pencil, count, 0, rough);
+  const double shift = shift_below_zero(M, K);
   std::vector<double> theta;
-  for (const std::complex<double> one : nearest.theta) theta.push_back(one.real());
+  {
+    ShiftInvert pencil = make_shift_invert(K, M, Keep::factor, options);
+    move_to(pencil, shift);
+    theta = solve_nearest(pencil, count, 0, rough).theta;
+  }
   std::sort(theta.begin(), theta.end());
-  if (theta.size() < static_cast<std::size_t>(count))
-    return {
-        {OutcomeKind::not_converged, format("%zu of %d real modes found", theta.size(), static_cast<int>(count)), 0, 0},
-        {},
-        {}};
-  const double last = theta[static_cast<std::size_t>(count) - 1];
-  RealModes modes = search_below(last + 10 * rough * (last - shift), pencil);
-  const std::size_t kept = std::min(modes.omega.size(), static_cast<std::size_t>(count));
-  modes.omega.resize(kept);
-  modes.shapes.erase(modes.shapes.begin() + static_cast<std::ptrdiff_t>(kept), modes.shapes.end());
+  const auto wanted = static_cast<std::size_t>(count);
+  if (theta.size() < wanted)
+    return {{OutcomeKind::not_converged, format("%zu of %zu real modes found", theta.size(), wanted), 0, 0}, {}, {}};
+  const double last = theta[wanted - 1];
+  RealModes modes = search_below(M, K, last + 10 * rough * (last - shift), options);
+  keep_first(modes, std::min<std::ptrdiff_t>(count, std::ssize(modes.omega)));
   return modes;
 }
 
@@ -204,57 +184,11 @@ double shift_below_zero(Mat M, Mat K)
   return -1e-8 * trace(K) / trace(M);
 }
 
-RealCount make_real_count(Mat M, Mat K, const ModesOptions& options)
+Inertia inertia_at(double limit, Mat M, Mat K, const PencilOptions& options, const EliminationOrder& order)
 {
-  PetscInt n = 0;
-  check(MatGetSize(K, &n, nullptr));
-  RealCount count{.K = K, .M = M, .options = options.pencil};
-  count.below[0] = 0;
-  if (n > options.dense_limit) return count;
-  const SymmetricEigenpairs all = solve_whole(M, K);
-  count.all.assign(all.lambda.begin(), all.lambda.end());
-  return count;
-}
-
-int count_below(RealCount& count, double omega)
-{
-  if (!count.all.empty())
-    return static_cast<int>(std::lower_bound(count.all.begin(), count.all.end(), omega * omega) - count.all.begin());
-  const auto [known, is_new] = count.below.try_emplace(omega);
-  if (!is_new) return known->second;
-  return known->second = inertia_at(omega * omega, pencil_of(count)).below;
-}
-
-const EliminationOrder& order_of(RealCount& count)
-{
-  if (count.order.position.empty()) count.order = elimination_order(count.K);
-  return count.order;
-}
-
-void free_factor(RealCount& count)
-{
-  count.pencil = {};
-}
-
-std::vector<double> omegas_between(RealCount& count, double least, double top)
-{
-  std::vector<double> omega;
-  const auto take = [&](double theta)
-  {
-    if (theta >= least * least && theta < top * top) omega.push_back(std::sqrt(theta));
-  };
-  if (!count.all.empty())
-    std::for_each(count.all.begin(), count.all.end(), take);
-  else
-  {
-    free_factor(count); // before one that is kept
-    ShiftInvert pencil = make_shift_invert(count.K, count.M, Symmetry::symmetric, count.options, &order_of(count));
-    move_to(pencil, top * top);
-    const Nearest nearest = solve_nearest(pencil, 1, top * top - least * least, 1e-4);
-    for (const std::complex<double> theta : nearest.theta) take(theta.real());
-  }
-  std::sort(omega.rbegin(), omega.rend());
-  return omega;
+  ShiftInvert pencil = make_shift_invert(K, M, Keep::count, options, &order);
+  move_to(pencil, limit);
+  return {pencil.shift, pencil.factor->negative_pivots()};
 }
 
 RealModes solve_real_modes(Mat M, Mat K, PetscInt count, const ModesOptions& options)
@@ -263,8 +197,7 @@ RealModes solve_real_modes(Mat M, Mat K, PetscInt count, const ModesOptions& opt
   check(MatGetSize(K, &n, nullptr));
   if (count <= 0) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
   if (n <= options.dense_limit) return first_of(solve_whole(M, K), K, count);
-  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options.pencil);
-  return search_first(std::min(count, n), pencil);
+  return search_first(M, K, std::min(count, n), options.pencil);
 }
 
 RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options)
@@ -272,14 +205,10 @@ RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& 
   PetscInt n = 0;
   check(MatGetSize(K, &n, nullptr));
   const double omega = two_pi * band;
-  if (n <= options.dense_limit)
-  {
-    const SymmetricEigenpairs all = solve_whole(M, K);
-    const auto below = std::lower_bound(all.lambda.begin(), all.lambda.end(), omega * omega);
-    return first_of(all, K, below - all.lambda.begin());
-  }
-  ShiftInvert pencil = make_shift_invert(K, M, Symmetry::symmetric, options.pencil);
-  return search_below(omega * omega, pencil);
+  if (n > options.dense_limit) return search_below(M, K, omega * omega, options.pencil);
+  const SymmetricEigenpairs all = solve_whole(M, K);
+  const auto below = std::lower_bound(all.lambda.begin(), all.lambda.end(), omega * omega);
+  return first_of(all, K, below - all.lambda.begin());
 }
 
 RealModes find_real_modes_below(const LinearisedSliding& linearised, double band, const ModesOptions& options)
@@ -297,7 +226,7 @@ RealModes find_real_modes_between(const LinearisedSliding& linearised, double lo
   if (!(low < high)) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
   if (low <= 0 || n <= options.dense_limit) return find_real_modes_below(linearised, high, options);
   const auto theta = [](double frequency_hz) { return std::pow(two_pi * frequency_hz, 2); };
-  ShiftInvert pencil = make_shift_invert(linearised.K_z, linearised.M_z, Symmetry::symmetric, options.pencil);
+  ShiftInvert pencil = make_shift_invert(linearised.K_z, linearised.M_z, Keep::factor, options.pencil);
   RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};
   append_between(theta(low), theta(high), 1, pencil, modes);
   to_structure(modes, linearised.contact.Z);

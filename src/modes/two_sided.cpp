@@ -1,10 +1,9 @@
 #include "squeal/modes/two_sided.hpp"
 
-#include "subspace.hpp"
+#include "squeal/modes/dense_losses.hpp"
+#include "squeal/modes/passes.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <Eigen/SVD>
 
 namespace squeal
 {
@@ -13,18 +12,33 @@ namespace
 {
 
 using Complex = std::complex<double>;
-using Eigen::MatrixXcd;
 
 constexpr double two_sided_tolerance = 1e-13; // backward error: derivatives are off by it to first order
-constexpr double near = 1e-6;                 // backward errors from which on lambda follows the vectors
 constexpr int two_sided_passes = 60;          // each adds two vectors to a side, with which small problems stay small
 constexpr double beside = 1e-4; // of tau from -Re(lambda^2), which is an eigenvalue of the pencil without damping
 
-/// The vector that the problem on the subspace takes nearest to zero.
-DenseEigenpair null_vector(const Subspace& space, Complex lambda)
+/// The pair nearest lambda, from a first vector.
+Eigenpair nearest_pair(const QuadraticProblem& problem, Mat K_loss, const MultiVector& start, const PencilFactor& P,
+                       Complex lambda)
 {
-  const Eigen::BDCSVD<MatrixXcd> svd(sum(entries_of(space), loss_factors(lambda)), Eigen::ComputeFullV);
-  return {lambda, svd.matrixV().col(svd.matrixV().cols() - 1)};
+  constexpr double lowest = 0.7, highest = 1.4; // of |lambda|
+  const double square = std::norm(lambda);
+  QuadraticSolution found = solve_on_subspace(problem, lambda.imag() == 0 ? nullptr : K_loss, start, &P,
+                                              {.window = {lowest * lowest * square, highest * highest * square},
+                                               .passes = two_sided_passes,
+                                               .pairs = 1,
+                                               .tolerance = two_sided_tolerance,
+                                               .sharp = two_sided_tolerance,
+                                               .near = lambda});
+  Eigenpair nearest{HUGE_VAL, {}, {}, HUGE_VAL};
+  for (Eigenpair& pair : found.pairs)
+    if (std::abs(pair.lambda - lambda) < std::abs(nearest.lambda - lambda)) nearest = std::move(pair);
+  return nearest;
+}
+
+MultiVector parts_of(const Eigenpair& pair)
+{
+  return columns_of(std::array{pair.real.get(), pair.imaginary.get()});
 }
 
 /// x'y without conjugation, of real and imaginary parts.
@@ -35,60 +49,43 @@ Complex bilinear(const MultiVector& x, const MultiVector& y)
 }
 
 /// By the two-sided Rayleigh quotient.
-Complex change_of_lambda(const Subspace& space, Complex lambda, const MultiVector& left, const MultiVector& right)
+Complex change_of_lambda(const TwoSidedProblem& problem, const TwoSidedMode& mode)
 {
-  std::array<Complex, 4> products{};
-  Complex residual = 0;
-  const ComplexFactors factor = loss_factors(lambda);
-  for (std::size_t k = 0; k < 4; ++k)
-    if (space.terms[k].matrix)
-    {
-      products[k] = bilinear(left, product(space.terms[k].matrix, right));
-      residual += factor[k] * products[k];
-    }
-  return -residual / (2. * lambda * products[0] + products[1]);
+  const Complex lambda = mode.lambda;
+  const auto on_both = [&](Mat A) { return A ? bilinear(mode.left, product(A, mode.right)) : 0; };
+  const auto& [M, C, K] = problem.right;
+  const Complex mass = on_both(M), damping = on_both(C);
+  const Complex residual =
+      lambda * lambda * mass + lambda * damping + on_both(K) + loss_factor_of(lambda) * on_both(problem.K_loss);
+  return -residual / (2. * lambda * mass + damping);
 }
 
 } // namespace
 
-TwoSidedProblem make_two_sided(const QuadraticProblem& matrices, Mat K_loss, const PencilOptions& options)
+TwoSidedProblem make_two_sided(const QuadraticProblem& matrices, Mat K_loss, Mat K_z, Mat M_z,
+                               const PencilOptions& options)
 {
   return {matrices,
           K_loss,
-          transpose_of(matrices.M),
-          transpose_of(matrices.C),
-          transpose_of(matrices.K),
+          {transpose_of(matrices.M), transpose_of(matrices.C), transpose_of(matrices.K)},
           K_loss ? transpose_of(K_loss) : Owned<Mat>{},
-          make_shift_invert(matrices.K, matrices.M, Symmetry::none, options)};
+          make_shift_invert(K_z, M_z, Keep::factor, options)};
 }
 
 TwoSidedMode find_two_sided(TwoSidedProblem& problem, Complex lambda, const MultiVector& start)
 {
-  const auto& [M, C, K] = problem.matrices;
   move_to(problem.pencil, -(1 + beside) * (lambda * lambda).real());
   const PencilFactor& P = *problem.pencil.factor;
-  Subspace right = empty_subspace({M, C, K, problem.K_loss}),
-           left = empty_subspace({problem.M_t, problem.C_t, problem.K_t, problem.K_loss_t});
-  extend(right, start);
-  extend(left, P.solve_transposed(product(problem.M_t, start)));
-  TwoSidedMode mode{lambda, {}, {}, HUGE_VAL};
-  for (int pass = 0;; ++pass)
-  {
-    DenseEigenpair y = null_vector(right, mode.lambda), x = null_vector(left, mode.lambda);
-    mode.right = vectors_of(right, {&y, 1});
-    mode.left = vectors_of(left, {&x, 1});
-    const bool follows = mode.backward_error < near;
-    if (follows) mode.lambda += change_of_lambda(right, mode.lambda, mode.left, mode.right);
-    if (lambda.imag() == 0) mode.lambda.imag(0);
-    y.lambda = x.lambda = mode.lambda;
-    const Residuals r = residuals_of(right, {&y, 1}), s = residuals_of(left, {&x, 1});
-    const double of_right = r.backward_error(0), of_left = s.backward_error(0);
-    mode.backward_error = std::max(of_right, of_left);
-    if ((follows && mode.backward_error <= two_sided_tolerance) || pass == two_sided_passes) return mode;
-    const bool wider_right = of_right > two_sided_tolerance && extend(right, P.solve(r.columns)),
-               wider_left = of_left > two_sided_tolerance && extend(left, P.solve_transposed(s.columns));
-    if (!wider_right && !wider_left && follows) return mode;
-  }
+  const Eigenpair right = nearest_pair(problem.right, problem.K_loss, start, P, lambda),
+                  left =
+                      nearest_pair(problem.left, problem.K_loss_t, P.solve(product(problem.left.M, start)), P, lambda);
+  TwoSidedMode mode{right.lambda, {}, {}, std::max(right.backward_error, left.backward_error)};
+  if (!std::isfinite(mode.backward_error)) return mode;
+  mode.right = parts_of(right);
+  mode.left = parts_of(left);
+  mode.lambda += change_of_lambda(problem, mode);
+  if (lambda.imag() == 0) mode.lambda.imag(0);
+  return mode;
 }
 
 } // namespace squeal

@@ -253,7 +253,7 @@ std::string options_to_go_on(const Report& report, const Scene& scene)
   if (equilibrium != OutcomeKind::converged)
     return format(" --set friction.coefficient=%g", scene.friction.coefficient / 2);
   if (has_run(modes.outcome) && !without_friction(report).empty()) return {};
-  if (modes.outcome.kind == OutcomeKind::not_converged) return " -modes_solver toar";
+  if (modes.outcome.kind == OutcomeKind::not_converged) return " --set modes.method=toar";
   if (has_motion && report.motion.cycle.multipliers.stability == Stability::undecided)
     return " -cycle_watched_periods 200";
   if (has_motion || has_study || !has_run(modes.outcome)) return {};

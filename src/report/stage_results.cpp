@@ -58,10 +58,8 @@ const char* count_remedy(const Modes& modes)
   if (modes.count.found > modes.count.expected)
     return "so none is known to be missing, but the count does not show it: friction or damping moves pairs across the "
            "end of the band; another modes.band may confirm it";
-  if (modes.method == ModesMethod::projection)
-    return "so an unstable one may be missing: raise modes.real_modes, or take modes.method = \"full\"";
   return "so one is overdamped or an unstable one is missing: with friction.direction_damping = false fewer are "
-         "overdamped, and -modes_solver slices and toar seek them in different ways";
+         "overdamped, and modes.method = \"toar\" seeks them another way";
 }
 
 void add_mode_error(Entry out, const ModeOnFinerMesh& mode)
@@ -113,10 +111,6 @@ void warn_of_modes(Entry out, const Modes& modes, const ModelSummary& model)
     out.warn(Severity::note,
              format("%td of the modes are within 0.01 %% of the threshold: mesh and damping decide their sign",
                     on_the_edge));
-  if (modes.routes_disagree)
-    out.warn(
-        Severity::warning,
-        "the two routes disagree on the number of unstable modes: raise modes.real_modes or modes.residual_passes");
   if (modes.count.certified_by == Certificate::none && modes.count.expected != modes.count.found)
     out.warn(Severity::severe, format("%d pairs were found where %d are expected, %s", modes.count.found,
                                       modes.count.expected, count_remedy(modes)));
@@ -190,12 +184,12 @@ void add_modes(Entry out, const Report& report)
   const bool is_certified = count.certified_by != Certificate::none;
   out.brief("unstable_count", "-", "modes that grow", modes.unstable_count);
   out.brief("band_hz", "Hz", "every mode below is reported", modes.band);
-  out.show("method", "route to the modes", modes.method);
+  out.show("method", "how the modes are found", modes.method);
   out.add("iterations", "-", "iterations of the eigensolver", modes.outcome.iterations);
   out.check(modes.outcome.kind == OutcomeKind::converged, "residual", "-", "largest backward error of a reported mode",
             modes.outcome.residual);
   out.check(is_certified || count.expected == count.found, "count_check", "text",
-            "numbers of modes by either route and by inertia", modes.count_check);
+            "numbers of modes found, and expected by inertia", modes.count_check);
   out.add("count_certified_by", "word", "`inertia`; `all pairs`: the problem was solved whole; `null`: not certified",
           is_certified ? Json(word(count.certified_by)) : Json());
   out.add("count_expected", "-", "number of pairs below `count_frequency_hz` by that count", count.expected);
@@ -208,7 +202,6 @@ void add_modes(Entry out, const Report& report)
     out.show("dependent_rows", "-", "rows of pairs that stick which the other rows imply", dependent);
   out.list("modes", add_mode, modes.modes);
   add_mesh_error(out, report.point.mesh_error);
-  if (out.has(!modes.projected.empty())) out.list("projected", add_mode, modes.projected); // of the other route
   warn_of_modes(out, modes, report.model);
 }
 

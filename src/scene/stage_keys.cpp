@@ -17,10 +17,9 @@ SceneKeys keys_of(ModesSettings& m)
   return {
       {"enabled", &m.enabled, "switch", "run this stage"},
       {"method", choice_of(m.method), "word",
-       "projection on real modes, the full sparse problem, or both, where the full one decides; auto is full, and both "
-       "where the count of pairs below the band is not confirmed"},
-      {"real_modes", &m.real_modes, "-", "number of real modes of the projection; 0: those of the band", not_negative},
-      {"residual_passes", &m.residual_passes, "-", "corrections of the projection by the residual", not_negative},
+       "slices of the band, corrected by residuals (full), or SLEPc's TOAR around zero, to compare "
+       "with "
+       "(toar)"},
       {"band", &m.band, "Hz", "every mode below is reported", positive},
       {"mesh_error", choice_of(m.mesh_error), "word",
        "what the mesh leaves open on the unstable modes and the next one: off, or by a model with every element "

@@ -154,7 +154,7 @@ std::vector<double> displacements(const Structure& structure, Vec force)
   constexpr double enough = 1e-6, rounding = 1e-13;
   double size = 0, last = HUGE_VAL;
   check(VecNorm(force, NORM_2, &size));
-  PencilFactor factor(structure.K, structure.M, Symmetry::symmetric, {});
+  PencilFactor factor(structure.K, structure.M, Keep::factor, {});
   factor.factorise(-1e-8 * trace(structure.K) / trace(structure.M)); // below every eigenvalue of K x = theta M x
   const Owned<Vec> u = zeros_like(force), residual = zeros_like(force), change = zeros_like(force);
   check(VecCopy(force, residual));

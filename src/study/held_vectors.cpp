@@ -208,8 +208,9 @@ HeldVectors unstable_vectors(const SensitivityProblem& problem, Sensitivity& res
   const auto& [structure, interface, equilibrium] = problem.sliding;
   const ClosedContact& contact = problem.linearised.contact;
   const QuadraticProblem matrices = sliding_problem(structure, problem.linearised);
-  const Owned<Mat> K_loss = structure.K_loss.get() ? project(structure.K_loss, contact.Y, contact.Z) : Owned<Mat>{};
-  TwoSidedProblem two_sided = make_two_sided(matrices, K_loss, problem.modes_options.pencil);
+  const Owned<Mat> K_loss = sliding_loss(structure, problem.linearised);
+  TwoSidedProblem two_sided =
+      make_two_sided(matrices, K_loss, problem.linearised.K_z, problem.linearised.M_z, problem.modes_options.pencil);
   HeldVectors vectors{{}, empty_multivector(structure.K), empty_multivector(structure.K)};
   std::vector<TwoSidedMode> modes;
   for (const ComplexMode& mode : problem.modes.unstable())

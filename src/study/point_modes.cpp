@@ -321,7 +321,7 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   MultiVector shapes = empty_multivector(modes.K_z);
   for (const Owned<Vec>& shape : real.shapes) append(shapes, shape);
   extend(modes.basis, product(modes.contact.Z, shapes));
-  modes.pencil = make_shift_invert(modes.K_z, modes.M_z, Symmetry::symmetric, problem.options.pencil);
+  modes.pencil = make_shift_invert(modes.K_z, modes.M_z, Keep::factor, problem.options.pencil);
   move_to(modes.pencil, shift_below_zero(modes.M_z, modes.K_z));
 }
 

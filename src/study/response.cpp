@@ -216,7 +216,7 @@ MultiVector corrections(const HarmonicBasis& basis, const std::vector<double>& o
     MultiVector residuals = dynamic_forces(basis.on, basis.equations.point, side,
                                            {Eigen::VectorXcd::Map(lambda.data(), a.cols()), parts, y});
     residuals.entries.leftCols(a.cols()) -= basis.equations.of(side).columns.entries(Eigen::all, forces);
-    append(result, side == Side::right ? P.solve(residuals) : P.solve_transposed(residuals));
+    append(result, P.solve(residuals));
   }
   return result;
 }
@@ -238,7 +238,7 @@ std::optional<PartResponse> solve_part(const Equations& equations, const std::ve
   HarmonicBasis basis{equations, make_basis(structure, interface, sketches)};
   move_to(pencil, (omega.front() * omega.front() + omega.back() * omega.back()) / 2);
   MultiVector start = pencil.factor->solve(equations.of(Side::right).columns);
-  append(start, pencil.factor->solve_transposed(equations.of(Side::left).columns));
+  append(start, pencil.factor->solve(equations.of(Side::left).columns));
   extend(basis, start);
   MatrixXcd before; // H at all frequencies of the part, without the last correction
   for (;;)
@@ -294,7 +294,7 @@ struct Part
 void solve_band(const ResponseProblem& problem, const Equations& equations, Response& response)
 {
   const MPI_Comm comm = comm_of(equations.sliding.K);
-  ShiftInvert pencil = make_shift_invert(equations.sliding.K, equations.sliding.M, Symmetry::none, problem.pencil);
+  ShiftInvert pencil = make_shift_invert(problem.linearised.K_z, problem.linearised.M_z, Keep::factor, problem.pencil);
   std::vector<Part> parts = {{0, problem.frequency_hz.size()}}; // those still to come, the lowest last
   Progress progress(comm, "response", static_cast<double>(problem.frequency_hz.size()));
   while (!parts.empty())

@@ -355,9 +355,7 @@ Modes changed_modes(const SensitivityProblem& problem, const Change& change, int
   changed.load = copy_of(own.load);
   changed.names = own.names;
   const SlidingEquilibrium sliding{changed, problem.sliding.interface, problem.sliding.equilibrium};
-  ModesSettings settings = problem.modes_settings;
-  settings.method = ModesMethod::full;
-  return find_modes(sliding, linearise(sliding), settings, problem.modes_options);
+  return find_modes(sliding, linearise(sliding), problem.modes_settings, problem.modes_options);
 }
 
 void find_change_effects(const SensitivityProblem& problem, Sensitivity& result)

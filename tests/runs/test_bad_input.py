@@ -48,7 +48,6 @@ velocity = [1, 0, 0]
 coefficient = 0.2
 [modes]
 band = 100
-real_modes = 10
 """
 
 

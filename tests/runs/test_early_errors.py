@@ -24,7 +24,7 @@ def refused(run, *words):
     assert not list(run.output.glob("*"))
 
 
-TOAR = ["-modes_solver", "toar"]
+TOAR = ["--set", "modes.method=toar"]
 # what is given, and words of the message
 OPTIONS = {
     "ranks among the arguments": (["--ranks", "4"], ["--ranks", "RANKS=4", "mpirun -n 4"]),
@@ -78,7 +78,7 @@ def test_one_message_before_the_first_stage(squeal, name):
 
 def scene_of(given):
     """A model on which the solver of these options works: small ones are solved whole by LAPACK."""
-    if "toar" in given:
+    if "modes.method=toar" in given:
         return [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
                 "--set", "modes.method=full", "--set", "modes.band=5000", "--set", "estimate.enabled=false"]
     return [OSCILLATOR, "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=60"]
@@ -168,7 +168,7 @@ def test_an_option_that_turns_out_unused_leaves_earlier_results(squeal):
     first = squeal(*given, ranks=1)
     before = first.report
     assert first.code == 0
-    run = squeal(*given, "--output", first.output, "-modes_solver", "toar", "-modes_pep_view_vectorz", ranks=1)
+    run = squeal(*given, "--output", first.output, *TOAR, "-modes_pep_view_vectorz", ranks=1)
     assert run.code == 1 and len(run.messages) == 1 and "-modes_pep_view_vectorz" in run.messages[0], run.errors
     assert first.report == before
     assert not (first.output / ".partial").exists()
@@ -178,7 +178,7 @@ def test_an_option_that_turns_out_unused_leaves_earlier_results(squeal):
 def test_a_stage_that_fails_leaves_what_finished(squeal, tmp_path, ranks):
     """One megabyte is too little for the eigensolver's factor, which shows after the equilibrium. The next run removes it."""
     given = [INPUTS / "pin_on_disc", "--output", tmp_path / "results", "--set", "mesh.parameters.divisions=3", "--set",
-             "cycle.enabled=false", "--set", "modes.method=full", "-modes_solver", "toar"]
+             "cycle.enabled=false", "--set", "modes.method=toar"]
     run = squeal(*given, "-modes_st_mat_mumps_icntl_23", "1", ranks=ranks)
     partial = tmp_path / "results" / ".partial"
     assert run.code == 1 and f"results in {partial}" in run.errors, run.errors

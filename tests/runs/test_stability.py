@@ -168,38 +168,15 @@ def test_a_normal_force_that_chatters_is_warned_of(squeal):
         assert ("the normal force jumps" in run.printed) == chatters
 
 
-def pin_modes(squeal, *settings, code=0):
-    """The pin at mu = 0.3 has two unstable modes below 20 kHz; 1657 degrees of freedom."""
-    arguments = [word for setting in settings for word in ("--set", setting)]
-    run = squeal(INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=3", "--set",
-                 "modes.band=20000", "--set", "estimate.enabled=false", "--set", "cycle.enabled=false", *arguments,
-                 ranks=1)
-    assert run.code == code
-    return run
-
-
-def test_a_projection_without_passes_misses_an_unstable_mode_however_large_and_says_so(squeal):
-    """Figures of the modes' map: with 300 real modes one of two is missed, and the other's growth is .8 % off."""
-    truth = pin_modes(squeal, "modes.method=full").report["modes"]
-    assert truth["unstable_count"] == 2 and truth["outcome"] == "converged"
-    run = pin_modes(squeal, "modes.method=projection", "modes.real_modes=300", "modes.residual_passes=0", code=2)
-    assert run.report["modes"]["outcome"] == "not converged" and "backward error" in run.report["modes"]["reason"]
-    assert run.report["modes"]["unstable_count"] == 1
-    both = pin_modes(squeal, "modes.method=both", "modes.real_modes=60", "modes.residual_passes=0")
-    assert "the two routes disagree" in both.printed and both.report["modes"]["unstable_count"] == 2
-
-
-def test_residual_passes_bring_the_projection_to_the_full_problem(squeal):
-    """Growth rates to 1e-6 with 130 real modes and 3 passes (measured 2e-7 and 6e-9), and the count is confirmed."""
-    both = pin_modes(squeal, "modes.method=both", "modes.real_modes=130", "modes.residual_passes=3")
-    modes = both.report["modes"]
-    assert modes["count_check"].startswith("confirmed: 2 unstable by the full problem, 2 by projection")
-    assert "WARNING: the two routes" not in both.printed
-    for full, projected in zip(modes["modes"][:2], modes["projected"][:2]):
-        assert abs(projected["growth_rate"] / full["growth_rate"] - 1) < 1e-6
-        assert abs(projected["frequency_hz"] / full["frequency_hz"] - 1) < 1e-6
-
-
-def test_too_few_real_modes_lose_pairs_and_the_count_says_how_many(squeal):
-    few = pin_modes(squeal, "modes.method=projection", "modes.real_modes=20", "modes.residual_passes=0", code=2)
-    assert "pairs were found where" in few.printed and "the two routes" not in few.printed
+def test_residual_passes_and_slepc_find_the_same_modes(squeal):
+    """The pin at mu = 0.3 has two unstable modes below 20 kHz; 1657 degrees of freedom. Growth to 1e-6."""
+    full, toar = (squeal(INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=3", "--set",
+                         "modes.band=20000", "--set", "estimate.enabled=false", "--set", "cycle.enabled=false", "--set",
+                         f"modes.method={method}", ranks=1).report["modes"] for method in ("full", "toar"))
+    for modes in (full, toar):
+        assert modes["outcome"] == "converged" and modes["unstable_count"] == 2
+        assert modes["count_check"].startswith("confirmed")
+    assert len(full["modes"]) == len(toar["modes"])
+    for one, other in zip(full["modes"][:2], toar["modes"][:2]):
+        assert abs(one["growth_rate"] / other["growth_rate"] - 1) < 1e-6
+        assert abs(one["frequency_hz"] / other["frequency_hz"] - 1) < 1e-9

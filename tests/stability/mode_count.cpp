@@ -1,8 +1,8 @@
 // Where eigenvalues crowd, a pair moves like the square root of a change.
 #include "../support/flutter_chain.hpp"
 #include "squeal/algebra/shift_invert.hpp"
-#include "squeal/modes/projection.hpp"
-#include "squeal/modes/slices.hpp"
+#include "squeal/modes/pair_search.hpp"
+#include "squeal/modes/real_modes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,6 +16,12 @@ namespace
 
 constexpr double band = 10;                 // [Hz], all of the chain
 const ModesOptions large{.dense_limit = 0}; // the methods of large problems
+
+PairSearch pairs_of(const QuadraticProblem& problem, const QuadraticProblem& frictionless, double end,
+                    const ModesOptions& options)
+{
+  return search_pairs({problem, nullptr, frictionless.M, frictionless.K}, ModesMethod::full, end, options);
+}
 
 } // namespace
 
@@ -31,10 +37,10 @@ TEST_CASE("slices miss none of a hundred crowded pairs, and the frictionless str
   {
     CAPTURE(mu);
     const QuadraticProblem problem = flutter_chain(cells, mu);
-    RealCount count = make_real_count(frictionless.M, frictionless.K, large);
-    const CountedSolution sliced = solve_by_slices(problem, count, band, {});
-    CHECK(sliced.count.expected == 100);
-    CHECK(sliced.count.found == 100);
+    const PairSearch sliced = pairs_of(problem, frictionless, band, large);
+    const ModeCount count = count_pairs(sliced, 0, 2 * M_PI * band);
+    CHECK(count.expected == 100);
+    CHECK(count.found == 100);
     CHECK(count_unstable(sliced.solution) == flutter);
     CHECK(sliced.solution.outcome.residual < 1e-12);
     if (mu == 0.38)
@@ -68,9 +74,8 @@ TEST_CASE("slices find heavily and unevenly damped pairs as LAPACK does, and no 
       C[i][i + 1] = C[i + 1][i] = -dashpot;
     }
     const QuadraticProblem problem = problem_of(M, C, K);
-    RealCount count = make_real_count(frictionless.M, frictionless.K, large);
-    const QuadraticSolution sliced = solve_by_slices(problem, count, edge, {}).solution;
-    const QuadraticSolution whole = solve_quadratic(problem, {edge, 0, 0, 1000});
+    const QuadraticSolution sliced = pairs_of(problem, frictionless, edge, large).solution,
+                            whole = pairs_of(problem, frictionless, edge, {.dense_limit = 1000}).solution;
     REQUIRE(whole.pairs.size() > 20);
     const auto inside = std::count_if(sliced.pairs.begin(), sliced.pairs.end(),
                                       [](const Eigenpair& pair) { return std::abs(pair.lambda) < 0.5; });
@@ -94,10 +99,10 @@ TEST_CASE("slices find a hundred and thirty modes within a millionth of their fr
   const std::size_t size = stiffness.size();
   const QuadraticProblem problem = problem_of(diagonal(std::vector<double>(size, 1.)),
                                               diagonal(std::vector<double>(size, 0.01)), diagonal(stiffness));
-  RealCount count = make_real_count(problem.M, problem.K, large);
-  const CountedSolution sliced = solve_by_slices(problem, count, 1, {});
-  CHECK(sliced.count.expected == 200);
-  CHECK(sliced.count.found == 200);
+  const PairSearch sliced = pairs_of(problem, problem, 1, large);
+  const ModeCount count = count_pairs(sliced, 0, 2 * M_PI);
+  CHECK(count.expected == 200);
+  CHECK(count.found == 200);
   CHECK(sliced.solution.outcome.residual < 1e-12);
 }
 
@@ -152,30 +157,12 @@ TEST_CASE("real modes of ten equal free bodies include every rigid motion")
   CHECK((inner_products(shapes, product(problem.M, shapes)) - Eigen::MatrixXd::Identity(35, 35)).norm() < 1e-8);
 }
 
-// A basis of few real modes loses the coupling, and with it the flutter: silently, but for the backward error.
-TEST_CASE("the projection misses unstable pairs with too few real modes, and its backward errors say so")
-{
-  const int cells = 50;
-  const QuadraticProblem problem = flutter_chain(cells, 0.38), frictionless = flutter_chain(cells, 0);
-  const Mat M = frictionless.M, K = frictionless.K;
-  const auto projected = [&](int modes, int passes) {
-    return solve_projected(problem, M, K, solve_real_modes(M, K, modes, large), {band, passes, 100});
-  };
-  const QuadraticSolution few = projected(40, 0), all = projected(100, 0);
-  CHECK(count_unstable(few) == 0); // lower branch alone: nothing to couple with
-  CHECK(few.outcome.residual > 1e-3);
-  CHECK(count_unstable(all) == 44);
-  CHECK(all.outcome.residual < 1e-13);
-  const QuadraticSolution corrected = projected(40, 3);
-  CHECK(count_unstable(corrected) > count_unstable(few));
-}
-
 // MUMPS estimates its memory before it meets the pivots that rounding makes it put off. At -90 % of that it is always
 // short, and a solve without a factor would fail. X = A^-1 (A X) to 1e-12: cond(A) is below 1e3.
 TEST_CASE("a factor that runs short of its estimated memory is made again with more")
 {
   const QuadraticProblem chain = flutter_chain(400, 0);
-  ShiftInvert pencil = make_shift_invert(chain.K, chain.M, Symmetry::symmetric, {.room = -90});
+  ShiftInvert pencil = make_shift_invert(chain.K, chain.M, Keep::factor, {.room = -90});
   for (const double shift : {-1., 12.})
   {
     move_to(pencil, shift);
@@ -195,7 +182,7 @@ TEST_CASE("a shift that is an eigenvalue moves just below it, and the counts are
   std::vector<double> values;
   for (int i = 1; i <= 40; ++i) values.push_back(i);
   const QuadraticProblem problem = problem_of(diagonal(std::vector<double>(40, 1.)), zeros(40, 40), diagonal(values));
-  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Symmetry::symmetric, {});
+  ShiftInvert pencil = make_shift_invert(problem.K, problem.M, Keep::factor, {});
   move_to(pencil, 3);
   CHECK(pencil.shift < 3);
   CHECK(pencil.shift > 2.9999);

@@ -16,7 +16,6 @@ inline LimitCycle cycle_of(const SmallModel& model, const CycleSettings& setting
   const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};
   const LinearisedSliding linearised = linearise(sliding);
   ModesSettings modes_settings;
-  modes_settings.method = ModesMethod::full;
   const Modes modes = find_modes(sliding, linearised, modes_settings, {});
   REQUIRE(!modes.modes.empty());
   const ComplexMode& mode = modes.modes.front();

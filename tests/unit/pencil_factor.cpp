@@ -12,14 +12,14 @@ using namespace squeal;
 namespace
 {
 
-/// A chain whose springs also act one way, so that K is not symmetric where `one_way` is not zero.
-Owned<Mat> stiffness(std::size_t size, double one_way)
+/// A chain.
+Owned<Mat> stiffness(std::size_t size)
 {
   test::Rows K = test::zeros(size, size);
   for (std::size_t i = 0; i < size; ++i)
   {
     K[i][i] = 2.1 + 0.01 * static_cast<double>(i);
-    if (i + 1 < size) K[i][i + 1] = -1 + one_way, K[i + 1][i] = -1;
+    if (i + 1 < size) K[i][i + 1] = K[i + 1][i] = -1;
   }
   return test::sparse(K, K);
 }
@@ -50,21 +50,16 @@ TEST_CASE("solutions and counts do not depend on how the ranks make the factor")
   for (const auto& [size, whole_limit] : {std::pair<std::size_t, double>{37, 0}, {37, 1}, {2, 0}, {2, 1}})
   {
     const PencilOptions options{.whole_limit = whole_limit}; // shared by the ranks, of which some have no rows; whole
-    const Owned<Mat> M = mass(size), K = stiffness(size, 0.3), symmetric = stiffness(size, 0);
-    const Owned<Mat> transposed = transpose_of(K);
-    PencilFactor factor(K, M, Symmetry::none, options), counting(symmetric, M, Symmetry::symmetric, options),
-        discarding(symmetric, M, Symmetry::counted, options);
+    const Owned<Mat> M = mass(size), K = stiffness(size);
+    PencilFactor counting(K, M, Keep::factor, options), discarding(K, M, Keep::count, options);
     for (const double shift : {-1., 2.6})
     {
-      REQUIRE(factor.factorise(shift));
       REQUIRE(counting.factorise(shift));
       REQUIRE(discarding.factorise(shift));
       for (const PetscInt columns : {1, 2, 7})
       {
         const MultiVector B = random_multivector(K, columns);
-        CHECK(residual(K, M, shift, factor.solve(B), B) < 1e-11);
-        CHECK(residual(transposed, M, shift, factor.solve_transposed(B), B) < 1e-11);
-        CHECK(residual(symmetric, M, shift, counting.solve(B), B) < 1e-11);
+        CHECK(residual(K, M, shift, counting.solve(B), B) < 1e-11);
       }
       int below = counting.negative_pivots();
       CHECK((shift < 0 ? below == 0 : below > 0));

@@ -42,7 +42,6 @@ struct ReducedMasses
   Modes full_modes() const
   {
     ModesSettings settings;
-    settings.method = ModesMethod::full;
     return modes_of(masses, equilibrium, settings, {});
   }
 

@@ -199,10 +199,10 @@ TEST_CASE("the resolved text of a scene reads back as the same scene")
   const std::string matrix = "[matrices]\nfolder = \"matrices\"\n[[probe]]\nname = \"p\"\non = \"dof:3\"\n";
   for (const std::string& text : {brake, points, matrix})
   {
-    const std::string once = resolved_scene(read_scene(folder.write("scene.toml", text), {"modes.real_modes=7"}));
+    const std::string once = resolved_scene(read_scene(folder.write("scene.toml", text), {"modes.band=7000"}));
     const Scene again = read_scene(elsewhere.write("scene.toml", once), {});
     CHECK(resolved_scene(again) == once);
-    CHECK(again.modes.real_modes == 7);
+    CHECK(again.modes.band == 7000);
   }
 }
 
@@ -308,7 +308,7 @@ TEST_CASE("wrong types, signs and ranges are refused with key, value and what is
       {"name = \"hub\"", "name = \"\"", "not empty"},
       {"size = 4000", "size = \"big\"", "finite numbers"},
       {"tangents = [\"x\", [0, 1, 0]]", "tangents = [\"x\", \"y\", \"z\"]", "one or two"},
-      {"band = 5000", "band = 5000\nreal_modes = -1", "real_modes = -1"},
+      {"band = 5000", "band = -1", "band = -1"},
       {"[friction]", "[[friction]]", "is a table"},
       {"start = \"state.bin\"", "start = \"stat.bin\"", "there is no file"},
       {"file = \"brake.geo\"", "file = \"brek.geo\"", "there is no file"},

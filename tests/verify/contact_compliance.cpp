@@ -56,7 +56,6 @@ Complex exact_eigenvalue(double mu, double compliance)
 Modes full_modes(const SmallModel& model, const Equilibrium& equilibrium)
 {
   ModesSettings settings;
-  settings.method = ModesMethod::full;
   return test::modes_of(model, equilibrium, settings, {});
 }
 

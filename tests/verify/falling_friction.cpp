@@ -41,7 +41,6 @@ SmallModel model_of(const Belt& belt)
 ComplexMode mode_of(const SmallModel& model, const Equilibrium& equilibrium)
 {
   ModesSettings settings;
-  settings.method = ModesMethod::full;
   Modes modes = test::modes_of(model, equilibrium, settings, {});
   REQUIRE(modes.modes.size() == 1);
   return std::move(modes.modes.front());

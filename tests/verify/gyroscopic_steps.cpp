@@ -57,7 +57,6 @@ TEST_CASE("a step multiplies a small sliding motion with G by the discrete eigen
     const SmallModel model = gyroscopic_oscillator(0.3, 1, g);
     const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, {});
     ModesSettings settings;
-    settings.method = ModesMethod::full;
     const Modes modes = test::modes_of(model, equilibrium, settings, {});
     REQUIRE(!modes.modes.empty());
     for (const double theta : {0.5, 0.7}) check_discrete_motion(model, equilibrium, modes.modes.front(), theta);

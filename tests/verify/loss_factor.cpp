@@ -82,7 +82,6 @@ Modes modes_of(const Row& row, double band)
   check(MatGetLocalSize(structure.K, &local, nullptr));
   model.interface.B = matrix_of_rows({}, local, PETSC_COMM_WORLD);
   ModesSettings settings;
-  settings.method = ModesMethod::full;
   settings.band = band;
   return test::modes_of(model, find_equilibrium(model.structure, model.interface, {}), settings, {});
 }

@@ -101,12 +101,11 @@ test::SmallModel model_of(const Chain& chain)
   return model;
 }
 
-Modes modes_of(const Chain& chain, ModesMethod method, double band)
+Modes modes_of(const Chain& chain, double band)
 {
   const test::SmallModel model = model_of(chain);
   const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, {});
   ModesSettings settings;
-  settings.method = method;
   settings.band = band;
   return test::modes_of(model, equilibrium, settings, {});
 }
@@ -142,20 +141,19 @@ TEST_CASE("flutter pairs of two and four degrees of freedom are exact")
   for (const int cells : {1, 2})
     for (const double h : {0.3, 0.6, 5.})
       for (const double g : {0., 0.4, -3.})
-        for (const ModesMethod method : {ModesMethod::full, ModesMethod::both})
-        {
-          CAPTURE(h);
-          CAPTURE(g);
-          const Chain chain{cells, 3, 20, 21, 0.1, g, h};
-          const std::vector<Complex> exact = exact_pairs(chain, 10);
-          const Modes modes = modes_of(chain, method, 10);
-          compare(modes, exact, 1e-12, 1e-14); // rounding: no two roots are nearer than 0.1
-          CHECK(modes.unstable_count == unstable_in(exact));
-          CHECK(modes.count.certified_by == Certificate::all_pairs);
-        }
+      {
+        CAPTURE(h);
+        CAPTURE(g);
+        const Chain chain{cells, 3, 20, 21, 0.1, g, h};
+        const std::vector<Complex> exact = exact_pairs(chain, 10);
+        const Modes modes = modes_of(chain, 10);
+        compare(modes, exact, 1e-12, 1e-14); // rounding: no two roots are nearer than 0.1
+        CHECK(modes.unstable_count == unstable_in(exact));
+        CHECK(modes.count.certified_by == Certificate::all_pairs);
+      }
   // without gyroscopic part flutter begins at h = (k2 - k1)/2, less what the damping takes
-  CHECK(modes_of({1, 3, 20, 21, 0, 0, 0.49}, ModesMethod::full, 10).unstable_count == 0);
-  CHECK(modes_of({1, 3, 20, 21, 0, 0, 0.51}, ModesMethod::full, 10).unstable_count == 1);
+  CHECK(modes_of({1, 3, 20, 21, 0, 0, 0.49}, 10).unstable_count == 0);
+  CHECK(modes_of({1, 3, 20, 21, 0, 0, 0.51}, 10).unstable_count == 1);
 }
 
 TEST_CASE("of 5000 degrees of freedom all pairs of the band are found, with backward errors below 1e-12")
@@ -167,7 +165,7 @@ TEST_CASE("of 5000 degrees of freedom all pairs of the band are found, with back
     const Chain chain{2500, 1e6, 20, 21, 0.15, g, h};
     const std::vector<Complex> exact = exact_pairs(chain, 10);
     REQUIRE(exact.size() > 90);
-    const Modes modes = modes_of(chain, ModesMethod::full, 10);
+    const Modes modes = modes_of(chain, 10);
     compare(modes, exact, 1e-8, 1e-12); // rounding of a stiffness of 4e6 beside 20: 5e-11, with a sum of 2500 entries
     CHECK(modes.unstable_count == unstable_in(exact));
     CHECK(modes.count.certified_by == Certificate::none);

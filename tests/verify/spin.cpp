@@ -90,7 +90,6 @@ std::vector<double> pairs_of(Built built, double band)
   check(MatGetLocalSize(model.structure.K, &local, nullptr));
   model.interface.B = matrix_of_rows({}, local, world);
   ModesSettings settings;
-  settings.method = ModesMethod::full;
   settings.band = band;
   const Modes modes = test::modes_of(model, find_equilibrium(model.structure, model.interface, {}), settings, {});
   REQUIRE(modes.outcome.kind == OutcomeKind::converged);

@@ -3,7 +3,7 @@
 #include "../support/linearised.hpp"
 #include "../support/sliding_oscillator.hpp"
 #include "squeal/modes/modes.hpp"
-#include "squeal/modes/quadratic.hpp"
+#include "squeal/modes/passes.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>
@@ -15,11 +15,14 @@ using Complex = std::complex<double>;
 namespace
 {
 
-constexpr int by_lapack = 1000, by_arnoldi = 0; // dense limits
-
-QuadraticSolution solve(const QuadraticProblem& problem, int dense_limit)
+QuadraticSolution by_lapack(const QuadraticProblem& problem)
 {
-  return solve_quadratic(problem, {10, 0, 5, dense_limit});
+  return solve_whole(problem, nullptr, {vibration_floor(norms_of(problem)), 400 * M_PI * M_PI}); // below 10 Hz
+}
+
+QuadraticSolution by_arnoldi(const QuadraticProblem& problem)
+{
+  return solve_quadratic(problem, {10, 0, 5});
 }
 
 // Two modes coupled by friction (Hoffmann et al. 2002).
@@ -27,14 +30,14 @@ int unstable_modes_of_two(double mu, double c1, double c2)
 {
   const double k = 3.897114317029974;
   const QuadraticProblem problem = problem_of(diagonal({1, 1}), diagonal({c1, c2}), {{23.25, k - 11 * mu}, {k, 18.75}});
-  return count_unstable(solve(problem, by_lapack));
+  return count_unstable(by_lapack(problem));
 }
 
 // M = [3 1; 1 1], follower force P, damping b
 int unstable_modes_of_ziegler(double P, double b)
 {
   const QuadraticProblem problem = problem_of({{3, 1}, {1, 1}}, {{2 * b, -b}, {-b, b}}, {{2 - P, P - 1}, {-1, 1}});
-  return count_unstable(solve(problem, by_lapack));
+  return count_unstable(by_lapack(problem));
 }
 
 double distance(const QuadraticSolution& solution, Complex lambda)
@@ -67,7 +70,7 @@ TEST_CASE("two coupled modes flutter from the exact friction coefficient on, wit
   }
   const QuadraticProblem problem =
       problem_of(diagonal({1, 1}), diagonal({0, 0}), {{23.25, 3.897114317029974 - 5.5}, {3.897114317029974, 18.75}});
-  CHECK(distance(solve(problem, by_lapack), {0.118690019, 4.584112490}) < 1e-8); // all the digits that are given
+  CHECK(distance(by_lapack(problem), {0.118690019, 4.584112490}) < 1e-8); // all the digits that are given
 }
 
 TEST_CASE("the Ziegler column loses stability at its exact loads, sooner with vanishing damping")
@@ -81,9 +84,9 @@ TEST_CASE("the Ziegler column loses stability at its exact loads, sooner with va
 
 TEST_CASE("no unstable mode of a chain of cells is missed, solved whole or by Arnoldi")
 {
-  for (const int limit : {by_lapack, by_arnoldi})
+  for (const auto solve : {by_lapack, by_arnoldi})
   {
-    const QuadraticSolution many = solve(flutter_chain(50, 0.38), limit), fewer = solve(flutter_chain(50, 0.36), limit);
+    const QuadraticSolution many = solve(flutter_chain(50, 0.38)), fewer = solve(flutter_chain(50, 0.36));
     CHECK(many.outcome.kind == OutcomeKind::converged);
     CHECK(many.pairs.size() == 100);
     CHECK(count_unstable(many) == 44);
@@ -98,7 +101,7 @@ TEST_CASE("the wing of the NLEVP collection has its published eigenvalues")
   const QuadraticProblem wing = problem_of({{17.6, 1.28, 2.89}, {1.28, 0.824, 0.413}, {2.89, 0.413, 0.725}},
                                            {{7.66, 2.45, 2.1}, {0.23, 1.04, 0.223}, {0.6, 0.756, 0.658}},
                                            {{121, 18.9, 15.9}, {0, 2.7, 0.145}, {11.9, 3.64, 15.5}});
-  const QuadraticSolution solution = solve(wing, by_lapack);
+  const QuadraticSolution solution = by_lapack(wing);
   REQUIRE(solution.pairs.size() == 3);
   for (const Complex lambda :
        {Complex(0.09472173, 2.52287659), Complex(-0.88483025, 8.44151216), Complex(-0.91799817, 1.76058420)})

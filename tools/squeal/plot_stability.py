@@ -39,9 +39,6 @@ def draw_modes(runs):
         frequency = np.array([mode["frequency_hz"] for mode in modes["modes"]])
         growth = np.array([mode["growth_rate"] for mode in modes["modes"]])
         unstable = np.array([mode["unstable"] for mode in modes["modes"]], dtype=bool)
-        if modes.get("projected") and len(found) == 1:
-            axes.plot([m["frequency_hz"] / size for m in modes["projected"]], [m["growth_rate"] for m in modes["projected"]],
-                      "s", ms=7, mfc="none", mec="0.6", label="projection on real modes")
         shades = (SLIP, RED) if len(found) == 1 else (colour(k), colour(k))
         count = f"{unstable.sum()} of {len(unstable)}"
         for chosen, mark, wide, shade, words in ((~unstable, "o", 4, shades[0], "stable"), (unstable, "^", 8, shades[1], f"unstable, {count}")):

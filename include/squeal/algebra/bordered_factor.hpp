@@ -130,7 +130,7 @@ struct FactorForecast
 {
   FactorKind kind = FactorKind::automatic; // that it will be
   double bytes = 0;                        // of a Factor while it is made, without its Schur complement
-  double symmetric = 0, not_symmetric = 0; // numbers in MUMPS's L D L' and L U of A while they are made
+  double symmetric = 0;                    // numbers in MUMPS's L D L' of A while it is made
   double entries = 0;                      // of L of A alone
   double border_entries = 0;               // of E in a supernodal factor; 0: of another kind
   double operations = 0;                   // to make a Factor, on the rank that has most to do

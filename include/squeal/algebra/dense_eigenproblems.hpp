@@ -6,8 +6,6 @@
 
 #include <cmath>
 #include <complex>
-#include <functional>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -87,19 +85,5 @@ SymmetricEigenpairs solve_dense_symmetric(const Eigen::MatrixXd& M, const Eigen:
 /// These pairs from the matrices of rank 0, on every rank. Collective.
 SymmetricEigenpairs solve_dense_symmetric_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& K,
                                                  double shift);
-
-/// The real Schur form A = Q T Q', with 2 x 2 diagonal blocks in T for complex eigenvalues.
-struct SchurForm
-{
-  Eigen::MatrixXd T, Q;
-  std::vector<std::complex<double>> eigenvalues; // in the order of T's diagonal
-};
-
-/// Nothing if the QR algorithm does not converge.
-std::optional<SchurForm> schur_form(const Eigen::MatrixXd& A);
-
-/// Moves the chosen eigenvalues (of a conjugate pair both) to the front, by orthogonal similarities: the leading
-/// columns of Q then span their invariant subspace. Returns false if two eigenvalues are too close to change places.
-bool reorder(SchurForm& schur, const std::function<bool(std::complex<double>)>& chosen);
 
 } // namespace squeal

@@ -1,6 +1,6 @@
 #pragma once
-/// The factor of K - shift M by MUMPS, with METIS's nested dissection (src/README.md, section 8.6). It takes MUMPS's
-/// own interface, since PETSc's has no way to pass an order of elimination.
+/// The factor of K - shift M by MUMPS, with METIS's nested dissection (src/README.md, section 8.6).
+/// It takes MUMPS's own interface, since PETSc's has no way to pass an order of elimination.
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/algebra/multivector.hpp"
 
@@ -10,12 +10,12 @@
 namespace squeal
 {
 
-/// The property of the pencil that its factor makes use of.
-enum class Symmetry
+/// What is kept of a factor.
+enum class Keep
 {
-  none,      // L U
-  symmetric, // L D L', which counts eigenvalues
-  counted,   // L D L', of which nothing but that count is kept
+  factor, // L D L' of a symmetric K - shift M
+  count,  // of eigenvalues below the shift alone
+  lu,     // L U of an unsymmetric one
 };
 
 /// Options of all factors by MUMPS of the modes.
@@ -41,31 +41,27 @@ class PencilFactor
 {
 public:
   /// `order`: one that is known; null: found here.
-  PencilFactor(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options, const EliminationOrder* order = nullptr);
+  PencilFactor(Mat K, Mat M, Keep keep, const PencilOptions& options, const EliminationOrder* order = nullptr);
   ~PencilFactor();
 
   /// Returns false if the shift is an eigenvalue. Throws LibraryError if memory runs out.
   bool factorise(double shift);
 
-  /// The number of eigenvalues below the shift (Sylvester's law of inertia). Not of Symmetry::none.
+  /// The number of eigenvalues below the shift (Sylvester's law of inertia). Not of Keep::lu.
   int negative_pivots() const;
 
-  /// (K - shift M)^-1 X; not of Symmetry::counted.
+  /// (K - shift M)^-1 X; not of Keep::count.
   MultiVector solve(const MultiVector& X) const;
-
-  /// (K - shift M)'^-1 X
-  MultiVector solve_transposed(const MultiVector& X) const;
 
 private:
   struct Parts;
-  static MultiVector solve_with(Parts& parts, const MultiVector& X);
   static void solve_by_columns(Parts& parts, MultiVector& Y);
   static void solve_by_rows(Parts& parts, MultiVector& Y);
   std::unique_ptr<Parts> parts_;
 };
 
 /// Memory of a PencilFactor of K and M on all ranks together [bytes], by the forecast of a factor of K.
-double forecast_pencil(const FactorForecast& forecast, double entries_of_K, Symmetry symmetry,
-                       const PencilOptions& options, MPI_Comm comm);
+double forecast_pencil(const FactorForecast& forecast, double entries_of_K, const PencilOptions& options,
+                       MPI_Comm comm);
 
 } // namespace squeal

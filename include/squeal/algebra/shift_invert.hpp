@@ -1,13 +1,11 @@
 #pragma once
-/// The eigenvalues theta of K y = theta M y nearest a real shift, symmetric or not. A block Krylov space of (K - shift
+/// The eigenvalues theta of K y = theta M y nearest a real shift. A block Krylov space of (K - shift
 /// M)^-1 M finds them (src/README.md, section 8.7).
 ///
 /// Blocks are used for two reasons. Brakes have many nearly equal modes (doublets of a disc, one mode for each pin). A
 /// space grown from a single vector finds these late or never. MUMPS reads its factor once for a block. There are no
 /// restarts: the caller moves the shift instead. All functions are collective. Error: memory runs out (LibraryError).
 #include "squeal/algebra/pencil_factor.hpp"
-
-#include <complex>
 
 namespace squeal
 {
@@ -22,7 +20,7 @@ struct ShiftInvert
 
 /// The pencil at shift 0, not yet factored. Collective. K and M are borrowed and must outlive it. `order`: one that is
 /// known; null: found here.
-ShiftInvert make_shift_invert(Mat K, Mat M, Symmetry symmetry, const PencilOptions& options,
+ShiftInvert make_shift_invert(Mat K, Mat M, Keep keep, const PencilOptions& options,
                               const EliminationOrder* order = nullptr);
 
 /// Factors K - shift M, or with a slightly lower shift where this one is an eigenvalue. Throws LibraryError if memory
@@ -33,8 +31,7 @@ void move_to(ShiftInvert& pencil, double shift);
 struct Nearest
 {
   MultiVector space;
-  std::vector<std::complex<double>> theta;
-  double reach = 0;
+  std::vector<double> theta;
   bool converged = false; // if not, the space grew to its limit, and theta is empty
 };
 

@@ -26,11 +26,10 @@ using LossyMatrices = std::array<Eigen::MatrixXd, 4>;
 /// The sum of f_k A_k.
 Eigen::MatrixXcd sum(const LossyMatrices& A, const ComplexFactors& factors);
 
-/// The pairs with Im(lambda) > 0 and, without K_loss, the real ones. Collective.
+/// All pairs with Im(lambda) >= 0. Those that are real without K_loss stay as they are. Collective.
 std::vector<DenseEigenpair> solve_lossy_shared(MPI_Comm comm, const LossyMatrices& problem);
 
-/// All pairs with |lambda| <= limit, with both vectors. Those that are real without K_loss stay as
-/// they are. Collective.
+/// Those of them with |lambda| <= limit, with both vectors. Collective.
 std::vector<TwoSidedPair> solve_two_sided_lossy_shared(MPI_Comm comm, const LossyMatrices& problem, double limit);
 
 } // namespace squeal

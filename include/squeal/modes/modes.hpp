@@ -12,7 +12,7 @@
 namespace squeal
 {
 
-/// Errors are backward errors in the full problem, whichever route found the mode:
+/// Errors are backward errors in the full problem:
 ///     eta = |Q(lambda) y| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |y|), phi = Z y, Q and 1-norms of the matrices
 ///     Y'.Z, 2-norms of the vectors.
 struct ComplexMode
@@ -75,17 +75,15 @@ template <> inline constexpr std::array words_of<ModeShapes> = {"unstable", "all
 struct Modes
 {
   Outcome outcome;
-  ModesMethod method = ModesMethod::full; // what was solved: never automatic
+  ModesMethod method = ModesMethod::full;
   ModeShapes shapes = ModeShapes::unstable;
-  double band = 0;                    // [Hz] covered: every mode below is here
-  std::vector<ComplexMode> modes;     // Im(lambda) >= 0, by falling growth; of unstable ones those that oscillate first
-  std::vector<ComplexMode> projected; // the other route's, when both ran
-  std::vector<double> beyond_band;    // [Hz] pairs between the band and count.frequency
-  int unstable_count = 0;             // of is_unstable, the first ones
-  bool routes_disagree = false;       // on unstable_count, when both ran
-  bool beyond_inertia = false;        // gyroscopic or circulatory parts: the inertia does not count the pairs
+  double band = 0;                 // [Hz] covered: every mode below is here
+  std::vector<ComplexMode> modes;  // Im(lambda) >= 0, by falling growth; of unstable ones those that oscillate first
+  std::vector<double> beyond_band; // [Hz] pairs between the band and count.frequency
+  int unstable_count = 0;          // of is_unstable, the first ones
+  bool beyond_inertia = false;     // gyroscopic or circulatory parts: the inertia does not count the pairs
   ModeCount count;
-  std::string count_check; // one sentence: unstable modes by either route, all modes by inertia
+  std::string count_check; // one sentence: pairs found, and expected by inertia
 
   std::span<const ComplexMode> unstable() const
   {
@@ -93,21 +91,10 @@ struct Modes
   }
 };
 
-/// How problems too large to be solved whole are solved.
-enum class ModesSolver
-{
-  slices, // of frequency (modes/slices.hpp)
-  toar,   // SLEPc's two-level Arnoldi around zero, with the options of -modes_pep_ and -modes_st_
-};
-
-template <> inline constexpr std::array words_of<ModesSolver> = {"slices", "toar"};
-
 /// Options -modes_...: how the eigenproblems are solved.
 struct ModesOptions
 {
   PetscInt dense_limit = 400; // up to this size eigenproblems are solved whole by LAPACK
-  ModesSolver solver = ModesSolver::slices;
-  PetscInt candidates = 20; // pairs that each residual pass of the projection corrects
   ModeShapes shapes = ModeShapes::unstable;
   PencilOptions pencil{}; // listed by themselves
 };
@@ -126,7 +113,7 @@ RealModes find_real_modes_below(const LinearisedSliding& linearised, double band
 RealModes find_real_modes_between(const LinearisedSliding& linearised, double low, double high,
                                   const ModesOptions& options);
 
-/// Finds all modes below the band of the settings by the route that they name, counts them, and marks unstable ones.
+/// Finds all modes below the band of the settings by the method that they name, counts them, and marks unstable ones.
 /// Collective. A search that misses modes has the outcome "not converged". Error: a factorisation runs out of memory.
 Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised, const ModesSettings& settings,
                  const ModesOptions& options);

@@ -1,9 +1,9 @@
 #pragma once
 /// The quadratic eigenproblem (lambda^2 M + lambda C + K) y = 0, unsymmetric (src/README.md, sections 3.4, 8.8).
 ///
-/// Small problems are solved whole, by LAPACK's QR on the companion matrix of mu = 1/(lambda - shift), which allows a
-/// singular M or K. Large ones are solved by SLEPc's two-level Arnoldi method (TOAR; Lu, Su, Bai 2016), shift-inverted
-/// near zero. Time is scaled by the band, lambda = 2 pi band nu; without that, growth rates lose their third digit.
+/// The problem, its pairs, and SLEPc's two-level Arnoldi method (TOAR; Lu, Su, Bai 2016), shift-inverted near zero,
+/// which the program's own search is compared with (pair_search.hpp). Time is scaled by the band, lambda = 2 pi band
+/// nu; without that, growth rates lose their third digit.
 ///
 /// Backward error of a pair (Tisseur 2000), in 1-norms of the matrices and 2-norms of the vectors:
 ///     eta = |(lambda^2 M + lambda C + K) y| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |y|)
@@ -23,6 +23,9 @@ struct QuadraticProblem
 /// C without the viscous equivalent of loss factors, under which modes would be overdamped far above its frequency. The
 /// structure has a K_loss. Collective.
 Owned<Mat> without_loss(Mat C, const Structure& structure);
+
+/// The stiffness of loss factors, Y'.Z; null without them. Collective.
+Owned<Mat> sliding_loss(const Structure& structure, const LinearisedSliding& linearised);
 
 /// That of small motions about sliding, Y'.Z, with C without the viscous equivalent of loss factors. Collective.
 QuadraticProblem sliding_problem(const Structure& structure, const LinearisedSliding& linearised);
@@ -48,18 +51,17 @@ struct QuadraticSettings
   double band = 0;  // [Hz] every pair with |lambda| <= 2 pi band
   double shift = 0; // of large problems: real, near zero, in parts of 2 pi band, not an eigenvalue; 0 if K is regular
   int expected = 0; // pairs in the band, for a start
-  PetscInt dense_limit = 0; // up to which size a problem is solved whole
 };
 
 /// outcome: "converged" or "not converged" (the band was not covered); residual: the largest backward error.
 struct QuadraticSolution
 {
   Outcome outcome;
-  std::vector<Eigenpair> pairs; // Im > 0 in the band, and real positive ones; largest real part first
+  std::vector<Eigenpair> pairs{}; // Im > 0 in the band, and real positive ones; largest real part first
 };
 
-/// Motions of a free body (|lambda|^2 below 1e-12 |K|/|M|) are no vibration and are left out, as are real negative
-/// lambda. Collective. Error: memory runs out, or LAPACK does not converge on a small problem.
+/// By SLEPc's TOAR. Motions of a free body (|lambda|^2 below 1e-12 |K|/|M|) are no vibration and are left out, as are
+/// real negative lambda. Collective. Error: memory runs out.
 QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const QuadraticSettings& settings);
 
 /// Sorts the pairs by falling real part, and sets outcome.residual to the largest backward error. Not collective.

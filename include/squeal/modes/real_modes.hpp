@@ -6,8 +6,6 @@
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/modes/modes.hpp"
 
-#include <map>
-
 namespace squeal
 {
 
@@ -15,33 +13,16 @@ namespace squeal
 /// where a free body leaves K singular.
 double shift_below_zero(Mat M, Mat K);
 
-/// Counts the omega below a limit: of a small problem from all eigenvalues, of a large one by the inertia of a factor.
-/// Counts are kept.
-struct RealCount
+/// The number of eigenvalues of K x = theta M x below `limit` [1/s2], or below a slightly lower limit where that is
+/// one.
+struct Inertia
 {
-  Mat K = nullptr, M = nullptr; // borrowed
-  PencilOptions options{};
-  std::vector<double> all{};     // eigenvalues omega^2 of a small problem
-  std::map<double, int> below{}; // the counts so far
-  EliminationOrder order{};      // of a large problem, from the first count on
-  ShiftInvert pencil{};          // the same
+  double limit = 0;
+  int below = 0;
 };
 
-/// A count for K x = omega^2 M x. Borrows M and K.
-RealCount make_real_count(Mat M, Mat K, const ModesOptions& options);
-
-/// The number of eigenvalues below omega [rad/s].
-int count_below(RealCount& count, double omega);
-
-/// Of K, found once.
-const EliminationOrder& order_of(RealCount& count);
-
-/// Gives back the memory of the factor. A further count makes it again.
-void free_factor(RealCount& count);
-
-/// All omega from `least` to `top` [rad/s], in descending order. None if the search does not converge. An omega that is
-/// missed makes a count below some limit too large, not too small.
-std::vector<double> omegas_between(RealCount& count, double least, double top);
+/// By a factor that is not kept.
+Inertia inertia_at(double limit, Mat M, Mat K, const PencilOptions& options, const EliminationOrder& order);
 
 /// The lowest `count` modes, or all if there are fewer. Shapes are x, in the rows of K.
 RealModes solve_real_modes(Mat M, Mat K, PetscInt count, const ModesOptions& options);

@@ -3,11 +3,9 @@
 ///     Q(lambda) y = 0,   Q(lambda)'x = 0,   Q = lambda^2 M + lambda C + K + f K_loss
 /// f is i of complex stiffness, 0 of a real lambda.
 ///
-/// Both vectors are sought on subspaces of their own. Residuals r join them as P^-1 r and P'^-1 r, P = K - tau M,
-/// tau = -Re(lambda^2), until both are small; the two-sided Rayleigh quotient then moves lambda.
+/// Both vectors are sought by residual passes on subspaces of their own (passes.hpp), with one factor of the symmetric
+/// problem at tau = -Re(lambda^2). The two-sided Rayleigh quotient then moves lambda.
 #include "squeal/algebra/shift_invert.hpp"
-#include "squeal/modes/dense_losses.hpp"
-#include "squeal/modes/modes.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 namespace squeal
@@ -16,21 +14,23 @@ namespace squeal
 /// The problem and its transposed one.
 struct TwoSidedProblem
 {
-  const QuadraticProblem& matrices;
-  Mat K_loss = nullptr;               // of one layout with them; null: none
-  Owned<Mat> M_t, C_t, K_t, K_loss_t; // transposed
-  ShiftInvert pencil{};               // of K and M
+  const QuadraticProblem& right;
+  Mat K_loss = nullptr; // of one layout with them; null: none
+  QuadraticProblem left;
+  Owned<Mat> K_loss_t;
+  ShiftInvert pencil{}; // of the symmetric problem
 };
 
-/// Borrows the matrices. Collective.
-TwoSidedProblem make_two_sided(const QuadraticProblem& matrices, Mat K_loss, const PencilOptions& options);
+/// Borrows the matrices, and the symmetric K_z and M_z near them. Collective.
+TwoSidedProblem make_two_sided(const QuadraticProblem& matrices, Mat K_loss, Mat K_z, Mat M_z,
+                               const PencilOptions& options);
 
 /// Vectors by their real and imaginary parts, in the rows of the problem.
 struct TwoSidedMode
 {
   std::complex<double> lambda;
   MultiVector right, left;
-  double backward_error = 0; // the larger one of both vectors
+  double backward_error = 0; // the larger one of both vectors; infinite: not found
 };
 
 /// The mode near a lambda with a right vector. Collective. Error: memory runs out.

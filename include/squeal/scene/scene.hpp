@@ -9,16 +9,14 @@
 namespace squeal
 {
 
-/// Route by which the complex modes are computed.
+/// How the complex modes are found.
 enum class ModesMethod
 {
-  projection, // projection on real modes
-  full,       // full sparse quadratic problem
-  both,       // the full problem, and the projection beside it
-  automatic,  // the full problem, and the projection beside it where the count up to the band is not certified
+  full, // by slices, corrected by residuals
+  toar, // SLEPc's two-level Arnoldi around zero
 };
 
-template <> inline constexpr std::array words_of<ModesMethod> = {"projection", "full", "both", "auto"};
+template <> inline constexpr std::array words_of<ModesMethod> = {"full", "toar"};
 
 /// The model on which the limit cycle is computed.
 enum class CycleModel
@@ -99,10 +97,8 @@ template <> inline constexpr std::array words_of<MeshErrorMethod> = {"off", "ref
 struct ModesSettings
 {
   bool enabled = true;
-  ModesMethod method = ModesMethod::automatic;
-  int real_modes = 0;      // [-] number of real modes of the projection; 0: those below the band
-  int residual_passes = 3; // [-] number of corrections of the projection
-  double band = 20000;     // [Hz] modes below this frequency are reported
+  ModesMethod method = ModesMethod::full;
+  double band = 20000; // [Hz] modes below this frequency are reported
   MeshErrorMethod mesh_error = MeshErrorMethod::off;
 };
 
