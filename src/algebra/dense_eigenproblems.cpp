@@ -168,22 +168,6 @@ std::vector<DenseEigenpair> right_pairs(std::vector<TwoSidedPair> pairs)
   return result;
 }
 
-/// Bases by the eigenvalues nu = 1/(theta + limit) of (K + limit M)^-1 M, whose left vectors u give (K + limit M)^-T u.
-InvariantSubspaces invariant_subspaces(const MatrixXd& M, const MatrixXd& K, double limit)
-{
-  const auto factor = regular_factor(MatrixXd(K + limit * M), "the undamped eigenproblem is singular at its shift");
-  const auto [nu, left, right] = eigenvectors(MatrixXd(factor.solve(M)), Vectors::both);
-  std::vector<DenseEigenpair> of_right, of_left; // real and imaginary parts of a pair have one |theta|
-  for (Index j = 0; j < nu.size(); ++j)
-    if (nu(j) != 0. && std::abs(1. / nu(j) - limit) <= limit)
-    {
-      of_right.push_back({nu(j), right.col(j)});
-      of_left.push_back({nu(j), left.col(j)});
-    }
-  return {orthonormal_columns(real_columns(of_right, K.rows())),
-          orthonormal_columns(factor.transpose().solve(real_columns(of_left, K.rows())))};
-}
-
 /// Gives every rank the pairs of rank 0, whose vectors have the names `vectors` and `rows` entries.
 template <class Pair> void share_pairs(MPI_Comm comm, std::vector<Pair>& pairs, Index rows,
                                        std::initializer_list<Eigen::VectorXcd Pair::*> vectors)
@@ -203,15 +187,6 @@ template <class Pair> void share_pairs(MPI_Comm comm, std::vector<Pair>& pairs, 
 }
 
 } // namespace
-
-InvariantSubspaces invariant_subspaces_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& K, double limit)
-{
-  InvariantSubspaces spaces;
-  on_rank_zero(comm, [&] { spaces = invariant_subspaces(M, K, limit); });
-  broadcast(spaces.right, comm);
-  broadcast(spaces.left, comm);
-  return spaces;
-}
 
 Eigen::MatrixXcd vectors_of(std::span<const TwoSidedPair> pairs, Eigen::VectorXcd TwoSidedPair::*side)
 {

@@ -49,7 +49,6 @@ struct Control
   int every = 1, since = 0; // calls of end_is_asked() between two agreements
   int ended_by = 0;         // agreed: a signal's number, or by_time_limit
   bool checkpoint_due = false;
-  int together = 0;         // number of ranks that work together; 0: all
   bool undisturbed = false; // nothing is asked
 };
 
@@ -129,18 +128,12 @@ bool end_is_asked(MPI_Comm comm)
 {
   Control& own = control();
   if (own.undisturbed) return false;
-  int ranks = 1, all = own.together;
+  int ranks = 1, all = 1;
   MPI_Comm_size(comm, &ranks);
-  if (all == 0) MPI_Comm_size(MPI_COMM_WORLD, &all);
+  MPI_Comm_size(MPI_COMM_WORLD, &all);
   if (ranks < all) return false; // the other ranks would not know, and would agree at another time
   if (++own.since >= own.every) agree_on_requests(comm);
   return own.ended_by != 0;
-}
-
-Finally work_of_part(MPI_Comm part)
-{
-  MPI_Comm_size(part, &control().together);
-  return Finally([] { control().together = 0; });
 }
 
 Finally undisturbed()

@@ -38,17 +38,6 @@ solve_two_sided_shared(MPI_Comm comm, const Matrix& M, const Matrix& C, const Ma
 /// Gives every rank the pairs of rank 0, whose vectors have so many rows. Collective.
 void share(MPI_Comm comm, std::vector<TwoSidedPair>& pairs, Eigen::Index rows);
 
-/// Orthonormal bases of the right and left invariant subspaces of K y = theta M y, neither symmetric, with
-/// |theta| <= limit. K + limit M is regular.
-struct InvariantSubspaces
-{
-  Eigen::MatrixXd right, left;
-};
-
-/// From the matrices of rank 0, on every rank. Collective.
-InvariantSubspaces invariant_subspaces_shared(MPI_Comm comm, const Eigen::MatrixXd& M, const Eigen::MatrixXd& K,
-                                              double limit);
-
 /// The pairs (lambda^2 M + lambda C + K) y = 0 with Im(lambda) >= 0 and finite lambda, from the matrices of rank 0, on
 /// every rank. M, C and K are of one size and not symmetric in general. Collective.
 template <class Matrix> std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Matrix& M,

@@ -40,10 +40,6 @@ void end_run_control();
 /// ranks than work together nothing is ever asked.
 bool end_is_asked(MPI_Comm comm);
 
-/// While one lives, `part` is all ranks that work together: end_is_asked() asks them. join_parts comes after.
-/// Collective among them.
-Finally work_of_part(MPI_Comm part);
-
 /// After parts of the ranks have worked by themselves: throws Interrupted if any of them was asked to end. Collective
 /// of all ranks.
 void join_parts(MPI_Comm comm);
