@@ -118,15 +118,24 @@ void JointUseMeter::add_step(const Interface& interface, const std::vector<doubl
                              const std::vector<ContactStatus>& statuses)
 {
   const PairView r(reactions, interface.directions);
-  std::size_t joint = 0;
+  std::size_t joint = 0, row = 0;
   for (std::size_t i = 0; i < statuses.size(); ++i)
   {
     if (!is_undriven(interface, i)) continue;
     const double limit = friction_coefficient(interface.friction.of(i), 0).value * r.normal(i);
     largest_.resize(std::max(largest_.size(), joint + 1));
-    slipped_.resize(largest_.size());
+    use_.slipped.resize(largest_.size());
+    use_.least.resize(std::max(use_.least.size(), row + r.tangential(i).size()), HUGE_VAL);
+    use_.greatest.resize(use_.least.size(), -HUGE_VAL);
+    for (const double friction : r.tangential(i))
+    {
+      const double part = limit > 0 ? friction / limit : 0;
+      use_.least[row] = std::min(use_.least[row], part);
+      use_.greatest[row] = std::max(use_.greatest[row], part);
+      ++row;
+    }
     if (limit > 0) largest_[joint] = std::max(largest_[joint], length(r.tangential(i)) / limit);
-    slipped_[joint] = slipped_[joint] || statuses[i] != ContactStatus::stick;
+    use_.slipped[joint] = use_.slipped[joint] || statuses[i] != ContactStatus::stick;
     ++joint;
   }
 }
@@ -134,11 +143,11 @@ void JointUseMeter::add_step(const Interface& interface, const std::vector<doubl
 JointUse JointUseMeter::result() const
 {
   constexpr double edge = 1 - 1e-3;
-  JointUse result;
+  JointUse result = use_;
   for (std::size_t joint = 0; joint < largest_.size(); ++joint)
   {
-    ++(slipped_[joint] ? result.slipping : result.held);
-    result.at_edge += !slipped_[joint] && largest_[joint] >= edge;
+    ++(use_.slipped[joint] ? result.slipping : result.held);
+    result.at_edge += !use_.slipped[joint] && largest_[joint] >= edge;
     result.largest = std::max(result.largest, largest_[joint]);
   }
   return result;
@@ -152,10 +161,15 @@ void OwnRest::follow(const SlidingEquilibrium& path, const FactorOptions& factor
     if (is_undriven(path.interface, PairRows<std::size_t>(path.interface.directions).pair_of(i)))
       moved = std::max(moved, std::abs(motion.offsets[i] - offsets_[i]));
   if (!(moved > near * motion.slip.swing)) return;
-  if (!rests_) rests_ = std::make_unique<Equilibria>(EquilibriumOptions{factor});
-  Equilibrium rest = rests_->at_offsets(path, motion.offsets);
+  Equilibrium rest = at(path, factor, motion.offsets);
   offsets_ = motion.offsets;
   if (rest.outcome.kind == OutcomeKind::converged) rest_ = std::move(rest);
+}
+
+Equilibrium OwnRest::at(const SlidingEquilibrium& path, const FactorOptions& factor, const std::vector<double>& offsets)
+{
+  if (!rests_) rests_ = std::make_unique<Equilibria>(EquilibriumOptions{factor});
+  return rests_->at_offsets(path, offsets);
 }
 
 SlidingEquilibrium OwnRest::about(const SlidingEquilibrium& path) const

@@ -1,6 +1,7 @@
 #include "squeal/cycle/limit_cycle.hpp"
 
 #include "floquet.hpp"
+#include "offset_spread.hpp"
 #include "preconditioner.hpp"
 
 #include "squeal/base/cost.hpp"
@@ -75,6 +76,14 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   cycle.measured =
       measure_period(map, {problem.probes, options.samples}, cycle.orbit.period, cycle.orbit.state, nullptr);
   ++cycle.convergence.periods;
+  if (cycle.outcome.kind == OutcomeKind::converged && cycle.orbit.offsets.held > 0 &&
+      whole_tangent_is_cheap(2. * dofs_of(cycle.orbit.state)))
+  {
+    Progress progress(comm_of(start.u), "cycle, offsets", 1);
+    ConvergenceLog log{progress};
+    const OrbitProblem found_again = problem_of(flow, inverse, start, settings.tolerance);
+    cycle.spreads = spread_over_offsets({map, found_again, options.shooting, log, cycle.orbit, cycle.measured});
+  }
   cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};
   add_remedies(map, cycle.outcome);
   return cycle;

@@ -101,6 +101,16 @@ void add_iteration(Entry out, const NewtonRecord& record)
   out.add("residual_full", "-", "residual in the full space", record.residual_full);
 }
 
+void add_spread(Entry out, const OffsetSpread& spread)
+{
+  out.add("contact", "-", "number of a contact whose held pairs are moved all alike, from 0", spread.contact);
+  out.add("direction", "-", "along which of their tangents, from 0", spread.direction);
+  out.add("least", "m", "least offset from that of the cycle, where the first pair would slip", spread.least);
+  out.add("greatest", "m", "greatest one", spread.greatest);
+  out.add("period_by_offset", "s/m", "change of the period by the offset", spread.by_period);
+  out.add("energy_by_offset", "J/m", "change of the mean fluctuating energy by it", spread.by_energy);
+}
+
 void add_joints(Entry out, const LimitCycle& cycle)
 {
   const JointUse& joints = cycle.measured.joints;
@@ -110,6 +120,7 @@ void add_joints(Entry out, const LimitCycle& cycle)
   out.show("largest_use", "-", "largest friction of one over its limit", joints.largest);
   out.show("at_edge", "-", "pairs that stick throughout, with a use within 1e-3 of 1", joints.at_edge);
   out.add("work", "J", "their work in a period, of each contact, below zero: what they take", work);
+  if (out.has(!cycle.spreads.empty())) out.list("offsets", add_spread, cycle.spreads);
 }
 
 /// Figures of the cycle, which would mislead where none was found.

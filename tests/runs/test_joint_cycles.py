@@ -128,6 +128,11 @@ def test_a_stuck_bracket_is_clamped(scene, converged, ranks):
     joints = cycle["joints"]
     assert joints["held"] == 3 and joints["slipping"] == joints["at_edge"] == 0
     assert joints["largest_use"] == pytest.approx(0.7404, abs=1e-3)
+    node = joints["offsets"][0]
+    assert node["contact"] == 1
+    if ranks == 1:  # a difference of two periods, which the place of events in the grid of time scatters
+        assert node["period_by_offset"] == pytest.approx(0.0064, rel=0.05)
+    assert node["least"] == pytest.approx(-0.063, rel=0.01) and node["greatest"] == pytest.approx(0.1021, rel=0.01)
     assert cycle["multipliers"]["offsets_held"] == 3 and cycle["multipliers"]["stability"] == "stable"
     for exact in (0.71516819, 0.43583040):
         assert min(abs(value - exact) for value in real_values(cycle)) < 1e-2  # the grid of time moves them

@@ -201,7 +201,8 @@ OF_SOME_BRANCHES = re.compile(r"branch\.(events\[\]\.\w+|reduction\..+|points\[\
 UNLESS_STABLE |= {f"equilibrium.undriven_pairs.{key}" for key in ("stick", "slip", "open", "at_limit", "increments", "change", "index",
                                                                   "reciprocal_condition")} | {"transient.joint_work[]", "modes.dependent_rows", "estimate.slip_amplitude",
                                                                   *(f"equilibrium.bolts[].{key}" for key in ("name", "shortening", "tension"))}
-UNLESS_STABLE |= {f"cycle.joints.{key}" for key in ("held", "slipping", "largest_use", "at_edge", "work[]")} | {"cycle.multipliers.offsets_held"}
+UNLESS_STABLE |= {f"cycle.joints.{key}" for key in ("held", "slipping", "largest_use", "at_edge", "work[]", *(f"offsets[].{key}" for key in (
+    "contact", "direction", "least", "greatest", "period_by_offset", "energy_by_offset")))} | {"cycle.multipliers.offsets_held"}
 
 
 def compare(documented, written):

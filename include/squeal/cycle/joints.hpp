@@ -32,9 +32,19 @@ void take_out_tangents(const Interface& interface, const std::vector<char>& pair
 /// The use of friction in a period.
 struct JointUse
 {
-  int held = 0, slipping = 0; // undriven pairs that stuck in every step, and that slipped in some
-  int at_edge = 0;            // of the held ones, those whose use comes within 1e-3 of 1
-  double largest = 0;         // |r_t|/(mu r_n) of all of them
+  int held = 0, slipping = 0;              // undriven pairs that stuck in every step, and that slipped in some
+  int at_edge = 0;                         // of the held ones, those whose use comes within 1e-3 of 1
+  double largest = 0;                      // |r_t|/(mu r_n) of all of them
+  std::vector<double> least{}, greatest{}; // of r_t/(mu r_n), of each undriven pair along each tangent
+  std::vector<char> slipped{};             // of each of them: in some step
+};
+
+/// The change of a cycle by moving the held pairs of a contact along one tangent, and how far they may move.
+struct OffsetSpread
+{
+  int contact = 0, direction = 0;
+  double least = 0, greatest = 0;      // [m] range of the offset from where it is
+  double by_period = 0, by_energy = 0; // [s/m], [J/m] of the fluctuating energy
 };
 
 /// The use over the steps of a period, by the reactions and statuses of each. Not collective.
@@ -46,8 +56,8 @@ public:
   JointUse result() const;
 
 private:
-  std::vector<double> largest_; // use of each undriven pair
-  std::vector<char> slipped_;   // each of them: in some step
+  JointUse use_;
+  std::vector<double> largest_; // of each undriven pair
 };
 
 /// The rest of a structure at the offsets of its motion, from period to period.
@@ -59,6 +69,9 @@ public:
 
   /// The rest, else the path's equilibrium.
   SlidingEquilibrium about(const SlidingEquilibrium& path) const;
+
+  /// The rest at any offsets.
+  Equilibrium at(const SlidingEquilibrium& path, const FactorOptions& factor, const std::vector<double>& offsets);
 
 private:
   std::unique_ptr<Equilibria> rests_{};

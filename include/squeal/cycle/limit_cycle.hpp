@@ -29,6 +29,7 @@ struct LimitCycle
   Orbit free;              // the end of the free motion that the search went on from; null where there was none
   StepCosts costs;         // of the last theta step made
   bool cut_short = false;  // the run was asked to end in the search for multipliers, or for finer steps
+  std::vector<OffsetSpread> spreads{}; // over the offsets that joints hold; where the whole tangent is cheap
 };
 
 struct ReducedModel;
