@@ -1,6 +1,7 @@
 #include "pivoting.hpp"
 
 #include <algorithm>
+#include <Eigen/QR>
 #include <numeric>
 #include <ranges>
 
@@ -14,7 +15,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The solution of a set of closed pairs, gaps and reactions times the compliance; nothing where a sign is wrong.
+/// The solution of a set of closed pairs; nothing where a sign is wrong or the pairs do not balance. Where they share a
+/// rigid face it is the shortest one.
 std::optional<StickSlipState> solution_of(const StickSlipOperator& of, const VectorXd& q,
                                           const std::vector<char>& closed)
 {
@@ -22,8 +24,22 @@ std::optional<StickSlipState> solution_of(const StickSlipOperator& of, const Vec
   MatrixXd system = of.N;
   for (Index i = 0; i < q.size(); ++i)
     if (closed[static_cast<std::size_t>(i)]) system.col(i) = -of.M.col(i) / of.compliance;
-  const VectorXd x = system.partialPivLu().solve(q);
-  if (!(x.minCoeff() >= -rounding * x.lpNorm<Eigen::Infinity>())) return std::nullopt;
+  const Eigen::PartialPivLU<MatrixXd> factors(system);
+  const VectorXd pivots = factors.matrixLU().diagonal().cwiseAbs();
+  VectorXd x;
+  if (pivots.minCoeff() > 1e-13 * pivots.maxCoeff())
+    x = factors.solve(q);
+  else
+  {
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal;
+    orthogonal.setThreshold(1e-12);
+    x = orthogonal.compute(system).solve(q);
+  }
+  const double scale = x.lpNorm<Eigen::Infinity>();
+  const VectorXd defect = system * x - q;
+  if (!(x.minCoeff() >= -rounding * scale) ||
+      defect.lpNorm<Eigen::Infinity>() > 1e-9 * std::max(scale, q.lpNorm<Eigen::Infinity>()))
+    return std::nullopt;
   StickSlipState state{VectorXd::Zero(q.size()), VectorXd::Zero(q.size())};
   for (Index i = 0; i < q.size(); ++i)
     closed[static_cast<std::size_t>(i)] ? state.r[i] = x[i] / of.compliance : state.w[i] = x[i];
