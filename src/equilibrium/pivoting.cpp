@@ -27,18 +27,15 @@ std::optional<StickSlipState> solution_of(const StickSlipOperator& of, const Vec
   const Eigen::PartialPivLU<MatrixXd> factors(system);
   const VectorXd pivots = factors.matrixLU().diagonal().cwiseAbs();
   VectorXd x;
-  if (pivots.minCoeff() > 1e-13 * pivots.maxCoeff())
+  if (pivots.minCoeff() > 1e-11 * pivots.maxCoeff())
     x = factors.solve(q);
   else
   {
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal;
-    orthogonal.setThreshold(1e-12);
+    orthogonal.setThreshold(1e-11);
     x = orthogonal.compute(system).solve(q);
   }
-  const double scale = x.lpNorm<Eigen::Infinity>();
-  const VectorXd defect = system * x - q;
-  if (!(x.minCoeff() >= -rounding * scale) ||
-      defect.lpNorm<Eigen::Infinity>() > 1e-9 * std::max(scale, q.lpNorm<Eigen::Infinity>()))
+  if (!(x.minCoeff() >= -rounding * x.lpNorm<Eigen::Infinity>()) || !((system * x - q).norm() <= 1e-9 * q.norm()))
     return std::nullopt;
   StickSlipState state{VectorXd::Zero(q.size()), VectorXd::Zero(q.size())};
   for (Index i = 0; i < q.size(); ++i)

@@ -36,13 +36,20 @@ public:
         !ended_)
     {
       std::vector<Followed> points = points_between(a, b);
+      const std::size_t known = found_.size();
       const Followed* last = &a;
       for (Followed& point : points)
       {
         look_between(*last, point, search_.follow(*last, point));
         last = &point;
       }
-      if (!points.empty()) return look_between(*last, b, search_.follow(*last, b));
+      if (!points.empty())
+      {
+        look_between(*last, b, search_.follow(*last, b));
+        // a mode that enters the band unstable changes in none of the parts: the whole of them holds its threshold
+        if (found_.size() == known && !ended_) record(a, b, changes);
+        return;
+      }
     }
     b.tracks.assign(b.modes.pairs.size(), -1);
     for (std::size_t i = 0; i < matches.size(); ++i)
