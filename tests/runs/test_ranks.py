@@ -50,15 +50,15 @@ def test_brake_transient(brakes):
 
 
 def test_brake_cycle(brakes):
-    """1e-7 of the period, 1e-6 of the energy, far below the 1e-3 to which the cycle is sought: beside rounding the iterates
-    depend on the ranks by the errors of the modes' shapes in the preconditioner, 1e-4 within a cluster of pins."""
+    """The energy to the 1e-3 to which the cycle is sought, the period to a hundredth of it: the iterates depend on the ranks by
+    the preconditioner, whose reduced model has modes of a cluster of pins, each known to 1e-4 within the cluster."""
     first = brakes[0]["cycle"]
     for run in brakes:
         cycle = run["cycle"]
         assert cycle["outcome"] == "converged" and cycle["residual_full"] < 1e-3
         assert cycle["periods_integrated"] == first["periods_integrated"]
-        assert cycle["period"] == pytest.approx(first["period"], rel=1e-7)
-        assert cycle["mean_energy"] == pytest.approx(first["mean_energy"], rel=1e-6)
+        assert cycle["period"] == pytest.approx(first["period"], rel=1e-5)
+        assert cycle["mean_energy"] == pytest.approx(first["mean_energy"], rel=1e-3)
 
 
 def test_brake_carries_its_clamp_force(brakes):
