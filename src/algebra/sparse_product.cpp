@@ -1,7 +1,6 @@
 #include "sparse_product.hpp"
 
 #include <algorithm>
-#include <Eigen/SparseCore>
 #include <petscsf.h>
 
 namespace squeal
@@ -15,11 +14,17 @@ using Eigen::MatrixXd;
 
 constexpr int lanes = 16; // columns at once
 
-/// Rows of A for a product; they end with `A`.
-Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor, PetscInt>> as_eigen(const CompressedRows& A,
-                                                                                  Index columns)
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, lanes, Eigen::RowMajor>;
+
+/// y gains A x. Sums of a row stay in registers, which Eigen's own product does not see to.
+void add_product(const CompressedRows& A, const Rows& x, Rows& y)
 {
-  return {A.rows, columns, A.starts[A.rows], A.starts, A.columns, A.values};
+  for (PetscInt i = 0; i < A.rows; ++i)
+  {
+    Eigen::Matrix<double, 1, lanes> sum = Eigen::Matrix<double, 1, lanes>::Zero();
+    for (PetscInt k = A.starts[i]; k < A.starts[i + 1]; ++k) sum += A.values[k] * x.row(A.columns[k]);
+    y.row(i) += sum;
+  }
 }
 
 } // namespace
@@ -60,23 +65,23 @@ bool is_sparse(Mat A)
 
 MatrixXd sparse_product(Mat A, const MatrixXd& X)
 {
-  using Rows = Eigen::Matrix<double, Eigen::Dynamic, lanes, Eigen::RowMajor>;
   const SplitMatrix parts = split(A);
   const CompressedRows own(parts.own);
   const RowType row(lanes);
   MatrixXd Y(own.rows, X.cols());
-  Rows x = Rows::Zero(X.rows(), lanes), y, received(parts.received, lanes);
+  Rows x = Rows::Zero(X.rows(), lanes), y(own.rows, lanes), received(parts.received, lanes);
   for (Index first = 0; first < X.cols(); first += lanes)
   {
     const Index count = std::min<Index>(lanes, X.cols() - first);
     x.leftCols(count) = X.middleCols(first, count);
     if (parts.foreign) check(PetscSFBcastBegin(parts.exchange, row.type, x.data(), received.data(), MPI_REPLACE));
-    y = as_eigen(own, x.rows()) * x;
+    y.setZero();
+    add_product(own, x, y);
     if (parts.foreign)
     {
       check(PetscSFBcastEnd(parts.exchange, row.type, x.data(), received.data(), MPI_REPLACE));
       const CompressedRows foreign(parts.foreign);
-      y += as_eigen(foreign, received.rows()) * received;
+      add_product(foreign, received, y);
     }
     Y.middleCols(first, count) = y.leftCols(count);
   }
