@@ -168,7 +168,7 @@ template <class Entry> void shorten_changes(SweptProblem<Entry>& problem)
   problem.residual_before = residual;
 }
 
-/// What sweeps did, the most of all patches.
+/// The largest residual and number of sweeps of all patches.
 struct Swept
 {
   double residual = 0; // estimated

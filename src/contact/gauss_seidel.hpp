@@ -5,7 +5,7 @@
 namespace squeal
 {
 
-/// What rank 0 asks of the others within ServedProducts.
+/// Requests of rank 0 to the others within ServedProducts.
 inline constexpr int end_of_service = 0, task_of_product = 1, task_of_sweeps = 2, task_of_gathering = 3;
 
 /// Block Gauss-Seidel; W r must be fresh, and is in the end. On rank 0; where ranks share W, the others must be within

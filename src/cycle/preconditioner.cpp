@@ -11,7 +11,7 @@ namespace squeal
 namespace
 {
 
-/// What applies P^-1.
+/// The correction and the function that applies P^-1 by it.
 struct RecordedInverse
 {
   MonodromyCorrection correction;

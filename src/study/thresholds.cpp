@@ -133,8 +133,9 @@ private:
     return points;
   }
 
-  /// What a step that is not divided any further holds: as many thresholds as there are more or fewer unstable modes,
-  /// of the least growth. Modes that only seem to change places are none. A track that is lost or new gets a number.
+  /// Records the thresholds of a step that is not divided any further: as many as there are more or fewer unstable
+  /// modes, of the least growth. Modes that only seem to change places are none. A track that is lost or new gets a
+  /// number.
   void record(const Followed& a, Followed& b, Changes& changes)
   {
     const bool gains = changes.gained.size() > changes.lost.size();

@@ -9,7 +9,7 @@ WEDGE = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
 TETRA = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
 HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 TETRA_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
-# By XDMF's code: number of nodes, faces, edges that have a mid-side node.
+# Solids by XDMF's code: number of nodes, faces, edges that have a mid-side node.
 SOLIDS = {9: (8, HEX, ()), 8: (6, WEDGE, ()), 48: (20, HEX, HEX_EDGES), 6: (4, TETRA, ()), 38: (10, TETRA, TETRA_EDGES)}
 SHELLS = {5: 4, 4: 3}  # number of nodes
 VTK = {9: 12, 8: 13, 48: 25, 6: 10, 38: 24, 5: 9, 4: 5}  # its number of each kind; the order of nodes is the same

@@ -10,7 +10,7 @@
 namespace squeal
 {
 
-/// What is kept of a factor.
+/// The part of a factor that is kept.
 enum class Keep
 {
   factor, // L D L' of a symmetric K - shift M

@@ -17,8 +17,8 @@ struct ReducedSpectrum
   Eigen::MatrixXd known_right, known_left;  // bases of their vectors' spans; left ones along the slow coordinates
 };
 
-/// Those above 0.85 whose vectors the full model is projected on, 4 at least and 24 at most: each costs a product with
-/// its tangent, and a search bounds the rest. Collective among the map's ranks.
+/// The multipliers above 0.85, 4 at least and 24 at most, on whose vectors the full model is projected. Each costs a
+/// product with its tangent, and a search bounds the rest. Collective among the map's ranks.
 ReducedSpectrum large_multipliers(ReducedMap& map, double period, std::span<const StepRecord> contacts);
 
 /// The values of the spectrum, their vectors and the resolvent for motions that have these coordinates in the

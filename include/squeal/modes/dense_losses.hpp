@@ -29,7 +29,7 @@ Eigen::MatrixXcd sum(const LossyMatrices& A, const ComplexFactors& factors);
 /// All pairs with Im(lambda) >= 0. Those that are real without K_loss stay as they are. Collective.
 std::vector<DenseEigenpair> solve_lossy_shared(MPI_Comm comm, const LossyMatrices& problem);
 
-/// Those of them with |lambda| <= limit, with both vectors. Collective.
+/// Eigenpairs with |lambda| <= limit, with both vectors. Collective.
 std::vector<TwoSidedPair> solve_two_sided_lossy_shared(MPI_Comm comm, const LossyMatrices& problem, double limit);
 
 } // namespace squeal

@@ -60,8 +60,8 @@ struct QuadraticSolution
   std::vector<Eigenpair> pairs{}; // Im > 0 in the band, and real positive ones; largest real part first
 };
 
-/// By SLEPc's TOAR. Motions of a free body (|lambda|^2 below 1e-12 |K|/|M|) are no vibration and are left out, as are
-/// real negative lambda. Collective. Error: memory runs out.
+/// The pairs in the band by SLEPc's TOAR. Motions of a free body (|lambda|^2 below 1e-12 |K|/|M|) are no vibration and
+/// are left out, as are real negative lambda. Collective. Error: memory runs out.
 QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const QuadraticSettings& settings);
 
 /// Sorts the pairs by falling real part, and sets outcome.residual to the largest backward error. Not collective.

@@ -21,7 +21,7 @@ struct Inertia
   int below = 0;
 };
 
-/// By a factor that is not kept.
+/// The count below a limit by a factor that is not kept.
 Inertia inertia_at(double limit, Mat M, Mat K, const PencilOptions& options, const EliminationOrder& order);
 
 /// The lowest `count` modes, or all if there are fewer. Shapes are x, in the rows of K.
