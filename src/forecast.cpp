@@ -83,6 +83,7 @@ struct Sizes
 {
   double dofs = 0, entries = 0;  // of K
   double pairs = 0, contact = 0; // rows of B
+  double of_rest = 0;            // rows of the equilibrium's problem
   double ranks = 1;
   FactorForecast factor{};
 
@@ -102,6 +103,7 @@ Sizes sizes_of(const Model& model, const FactorOptions& options)
   sizes.pairs = model.interface.pairs;
   sizes.ranks = ranks_of(comm_of(K));
   sizes.contact = static_cast<double>(model.interface.size());
+  sizes.of_rest = has_undriven_pairs(model.interface) ? sizes.contact : sizes.pairs;
   sizes.factor = forecast_factor(K, model.interface.pairs > 0 ? model.interface.B.get() : nullptr, options);
   return sizes;
 }
@@ -112,12 +114,13 @@ double memory_of_factor(const Sizes& sizes)
   return sizes.factor.bytes + 2 * triplet * sizes.entries / 2;
 }
 
-/// K with springs at the pairs, its factor, and five matrices of pairs: two parts of D, their sum with friction, a
-/// factor of that and, with springs, what these take off again.
+/// K with springs at the pairs, its factor, the rows of D, and four matrices of the rows: two parts of D, their sum
+/// with friction, and a factor of that. MUMPS has all of D at first.
 double memory_of_equilibrium(const Sizes& sizes)
 {
-  return matrix_entry * sizes.entries + memory_of_factor(sizes) + sizes.condensed_operator() +
-         4 * number * sizes.pairs * sizes.pairs;
+  const double first = sizes.factor.kind == FactorKind::mumps ? sizes.condensed_operator() : 0;
+  return matrix_entry * sizes.entries + memory_of_factor(sizes) + first +
+         number * sizes.of_rest * (sizes.contact + 4 * sizes.of_rest);
 }
 
 /// Six matrices: M and K of the frictionless problem, M, C and K of the sliding one, and C with friction. The pencil of
@@ -143,35 +146,28 @@ double memory_of_response(const Sizes& sizes, const Scene& scene, const ProgramO
          3 * 2 * number * sizes.ranks * pairs * scene.response->count;
 }
 
-/// Whether W stays in the factor, of the memory that is left beside it.
-bool stays_in_factor(const Sizes& sizes, double free)
-{
-  return sizes.factor.border_entries > 0 &&
-         squeal::stays_in_factor(sizes.contact, sizes.factor.border_entries, free - memory_of_factor(sizes));
-}
-
 bool shares_operator(const Sizes& sizes)
 {
-  return sizes.factor.border_entries > 0 && is_worth_sharing(sizes.contact, static_cast<int>(sizes.ranks));
+  return sizes.factor.kind == FactorKind::supernodal && is_worth_sharing(sizes.contact, static_cast<int>(sizes.ranks));
 }
 
 /// M and K together, the factor, and the near field in single precision, which may be all of W: 0.11 of it on the brake
 /// of 33 224 degrees of freedom. W is whole on rank 0, or ranks share its lower triangle.
-double memory_of_step(const Sizes& sizes, bool in_factor)
+double memory_of_step(const Sizes& sizes)
 {
   const double whole = sizes.condensed_operator(), near_field = whole / 2,
                stored = shares_operator(sizes) ? whole / 2 : whole;
   return (2 * number + sizeof(PetscInt)) * sizes.entries / 2 + matrix_entry * sizes.entries + memory_of_factor(sizes) +
-         near_field + (in_factor ? 0 : stored) + number * vectors_of_modes_kept * sizes.dofs;
+         near_field + stored + number * vectors_of_modes_kept * sizes.dofs;
 }
 
 /// A reduced model has at most a shape for each pair, and those of the modes. Two may be held: that of the start, which
 /// takes no more than its part of what is `free`, and that of the multipliers. Both have fewer shapes unless the
 /// reduced cycle is the answer. The latter is done without where it does not fit. The tangent needs a whole W.
-double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, bool in_factor, double free)
+double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, double free)
 {
-  const double whole = in_factor || shares_operator(sizes) ? sizes.condensed_operator() : 0;
-  const double least = memory_of_step(sizes, in_factor) + whole + number * vectors_of_shooting * sizes.dofs;
+  const double whole = shares_operator(sizes) ? sizes.condensed_operator() : 0;
+  const double least = memory_of_step(sizes) + whole + number * vectors_of_shooting * sizes.dofs;
   const auto shapes = [&](double pairs) { return memory_of_reduction(sizes.dofs, pairs + vectors_of_modes_kept); };
   const double multipliers = shapes(std::min<double>(sizes.pairs, attachments_on_recorded_contact)),
                all = fidelity == CycleModel::reduced ? shapes(sizes.pairs) : multipliers;
@@ -206,12 +202,12 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   forecast.factor_limit = 1e9 * options.factor.share_limit();
   forecast.held = sum_of_ranks(memory_entry("/proc/self/status", "VmRSS:").value_or(0), comm);
   const double free = free_memory(comm);
-  const bool in_factor = stays_in_factor(sizes, free);
-  const bool whole_operator = scene.cycle.enabled || (!in_factor && !shares_operator(sizes)); // tangents need one
-  forecast.on_rank_zero = sizes.condensed_operator() + (whole_operator ? 0 : 4 * number * sizes.pairs * sizes.pairs);
-  // two products a step, each of which reads half of W, or the rows of E twice
-  const double contact = in_factor ? 4 * number * sizes.factor.border_entries : sizes.condensed_operator();
-  forecast.step_seconds = seconds_of_calls + (sizes.factor.bytes + contact) / sizes.ranks / bytes_a_second;
+  const bool whole_operator = scene.cycle.enabled || !shares_operator(sizes); // tangents need one
+  forecast.on_rank_zero = std::max(whole_operator ? sizes.condensed_operator() : 0,
+                                   number * sizes.of_rest * (sizes.contact + 4 * sizes.of_rest));
+  // two products a step, each of which reads half of W
+  forecast.step_seconds =
+      seconds_of_calls + (sizes.factor.bytes + sizes.condensed_operator()) / sizes.ranks / bytes_a_second;
   forecast.factor_seconds = sizes.factor.operations / operations_a_second;
   const auto add = [&](Stage stage, double bytes) { forecast.stages.push_back({stage, forecast.held + bytes}); };
   add(Stage::equilibrium, memory_of_equilibrium(sizes));
@@ -219,8 +215,8 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   if (scene.response) add(Stage::response, memory_of_response(sizes, scene, options, comm));
   const double entries = 9 + static_cast<double>(scene.probes.size()); // of History, a step
   if (scene.transient.enabled)
-    add(Stage::transient, memory_of_step(sizes, in_factor) + number * entries * steps_of_transient(scene.transient));
-  if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity, in_factor, free));
+    add(Stage::transient, memory_of_step(sizes) + number * entries * steps_of_transient(scene.transient));
+  if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity, free));
   if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)));
   if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));
   forecast.steps = steps_of(scene, options);

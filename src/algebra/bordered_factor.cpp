@@ -1,7 +1,8 @@
 #include "squeal/algebra/bordered_factor.hpp"
 
 #include "cholesky.hpp"
-#include "mumps_factor.hpp"
+#include "squeal/algebra/pencil_factor.hpp"
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/free_memory.hpp"
 
@@ -11,18 +12,23 @@
 namespace squeal
 {
 
+/// A's factor by MUMPS beside B.
+struct MumpsBordered
+{
+  PencilFactor factor;
+  Owned<Mat> B; // null: none
+  bool regular = factor.factorise(0) && factor.negative_pivots() == 0;
+  MultiVector x{}; // A^-1 b
+};
+
 struct Factor::Parts
 {
   MPI_Comm comm = MPI_COMM_NULL;
-  int dofs = 0, border = 0;
-  RowLayout layout;                   // of the degrees of freedom
-  std::optional<Cholesky> cholesky{}; // takes and gives each rank's own rows; else
-  std::optional<MumpsFactor> mumps{}; // through rank 0
-  std::vector<double> right{};        // there: right-hand sides and then solutions, `dofs` long each
+  int border = 0;
+  std::optional<Cholesky> cholesky{}; // else
+  std::unique_ptr<MumpsBordered> mumps{};
 
   bool on_rank_zero() const { return rank_of(comm) == 0; }
-  int own_rows() const { return layout.counts[static_cast<std::size_t>(rank_of(comm))]; }
-  double* column(std::size_t k) { return on_rank_zero() ? &right[k * static_cast<std::size_t>(dofs)] : nullptr; }
 };
 
 namespace
@@ -42,6 +48,26 @@ Triplets bordered(Mat A, Mat B)
   Triplets entries = lower_triangle(A);
   if (B) append_rows(B, rows_of(A), entries);
   return entries;
+}
+
+/// B'F; F has a row for each of B, whole on every rank.
+MultiVector transposed_product(Mat B, const Eigen::MatrixXd& F)
+{
+  const Owned<Vec> rows = vector_of_rows(B);
+  std::vector<Owned<Vec>> images;
+  for (Eigen::Index k = 0; k < F.cols(); ++k)
+  {
+    images.push_back(vector_of_columns(B));
+    set_all_entries(rows, {F.col(k).data(), static_cast<std::size_t>(F.rows())});
+    check(MatMultTranspose(B, rows, images.back()));
+  }
+  return columns_of(std::vector<Vec>(images.begin(), images.end()));
+}
+
+PencilFactor by_mumps(Mat A)
+{
+  constexpr PetscInt room = 1; // [%] without delayed pivots the estimate is close
+  return PencilFactor(A, nullptr, Keep::factor, {room, 0, "factor_"});
 }
 
 /// What will be factored, how and in which order.
@@ -101,7 +127,6 @@ FactorForecast multifrontal_forecast(const SymbolicFactor& symbolic)
     waiting += square(inner);
     symmetric += columns * (columns + inner);
     forecast.entries += columns * ((columns + 1) / 2 + inner);
-    forecast.border_entries += columns * supernode.border;
   }
   return forecast;
 }
@@ -122,7 +147,7 @@ void scale_and_mirror(std::vector<double>& matrix, int size, double factor)
 /// The number of columns of a strip of moderate size that is wide enough for BLAS; see read().
 std::size_t strip_width(std::size_t size)
 {
-  constexpr std::size_t least = 384, numbers = 2 << 20, together = CondensedProducts::together; // 16 MB
+  constexpr std::size_t least = 384, numbers = 2 << 20, together = 24; // 16 MB; whole pairs and whole tiles
   return std::max(least, numbers / std::max<std::size_t>(1, size) / together * together);
 }
 
@@ -137,121 +162,111 @@ Factor::Factor(Mat A, Mat B, const FactorOptions& options) : parts_(std::make_un
 {
   Parts& parts = *parts_;
   parts.comm = comm_of(A);
-  parts.layout = row_layout(A);
-  parts.dofs = parts.layout.total();
   parts.border = rows_of(B);
   Plan plan = make_plan(A, B, options);
   if (plan.kind == FactorKind::mumps)
-    parts.mumps.emplace(
-        BorderedEntries{std::move(plan.entries), plan.symbolic.position, parts.dofs, parts.border, parts.comm});
+    parts.mumps.reset(new MumpsBordered{by_mumps(A), B ? shared(B) : Owned<Mat>()});
   else
-    parts.cholesky.emplace(std::move(plan.entries), std::move(plan.symbolic), parts.layout, parts.comm);
+    parts.cholesky.emplace(std::move(plan.entries), std::move(plan.symbolic), row_layout(A), parts.comm);
 }
 
 bool Factor::failed() const
 {
-  return parts_->cholesky ? parts_->cholesky->failed() : parts_->mumps->failed();
+  return parts_->cholesky ? parts_->cholesky->failed() : !parts_->mumps->regular;
 }
 
 std::vector<double> Factor::condensed(double scale) const
 {
-  std::vector<double> result;
-  if (const auto products = condensed_products())
-  {
-    const auto n = static_cast<std::size_t>(parts_->on_rank_zero() ? parts_->border : 0);
-    result = vector_on_large_pages(n * n);
-    result.resize(n * n);
-    products->read(
-        [&](const CondensedStrip& strip)
-        {
-          for (std::size_t j = strip.first; j < strip.last; ++j)
-            std::copy_n(strip.values + (j - strip.first) * strip.height, strip.height, &result[j * n + strip.first]);
-        });
-  }
-  else
-    result = parts_->mumps->take_schur_complement();
+  const auto n = static_cast<std::size_t>(parts_->on_rank_zero() ? parts_->border : 0);
+  std::vector<double> result = vector_on_large_pages(n * n);
+  result.resize(n * n);
+  read_condensed(
+      [&](const CondensedStrip& strip)
+      {
+        for (std::size_t j = strip.first; j < strip.last; ++j)
+          std::copy_n(strip.values + (j - strip.first) * strip.height, strip.height, &result[j * n + strip.first]);
+      });
   if (parts_->on_rank_zero()) scale_and_mirror(result, parts_->border, scale);
   return result;
 }
 
-std::optional<CondensedProducts> Factor::condensed_products() const
+void Factor::read_condensed(const std::function<void(const CondensedStrip&)>& take) const
 {
-  if (parts_->cholesky) return CondensedProducts(*parts_);
-  return {};
+  std::vector<std::size_t> firsts(static_cast<std::size_t>(ranks_of(parts_->comm)) + 1, at(parts_->border));
+  firsts[0] = 0;
+  read_condensed(take, firsts);
 }
 
-int CondensedProducts::size() const
+void Factor::read_condensed(const std::function<void(const CondensedStrip&)>& take,
+                            std::span<const std::size_t> firsts) const
 {
-  return parts_->border;
-}
-
-double CondensedProducts::entries() const
-{
-  return parts_->cholesky->border_entries();
-}
-
-std::vector<double> CondensedProducts::product(std::span<const double> x) const
-{
-  return parts_->cholesky->schur_product(x);
-}
-
-void CondensedProducts::read(const std::function<void(const CondensedStrip&)>& take,
-                             std::span<const std::size_t> shares) const
-{
-  const auto n = static_cast<std::size_t>(size());
-  const std::array<std::size_t, 2> of_rank_zero{0, n};
-  if (shares.empty()) shares = of_rank_zero;
-  std::vector<Cholesky::WantedColumns> strips;
-  for (std::size_t rank = 0; rank + 1 < shares.size(); ++rank)
-    for (std::size_t first = shares[rank]; first < shares[rank + 1]; first += strip_width(n))
-      strips.push_back({first, std::min(first + strip_width(n), shares[rank + 1]), to_int(rank)});
-  // those of all ranks in turn: each takes its own while the others form theirs
-  std::stable_sort(strips.begin(), strips.end(),
-                   [&](const auto& a, const auto& b)
-                   { return a.first - shares[at(a.rank)] < b.first - shares[at(b.rank)]; });
-  parts_->cholesky->read_schur_complement(strips, take);
+  const auto n = static_cast<std::size_t>(parts_->border);
+  if (parts_->cholesky)
+  {
+    std::vector<Cholesky::WantedColumns> strips;
+    for (std::size_t rank = 0; rank + 1 < firsts.size(); ++rank)
+      for (std::size_t first = firsts[rank]; first < firsts[rank + 1]; first += strip_width(n))
+        strips.push_back({first, std::min(first + strip_width(n), firsts[rank + 1]), to_int(rank)});
+    // those of all ranks in turn: each takes its own while the others form theirs
+    std::stable_sort(strips.begin(), strips.end(),
+                     [&](const auto& a, const auto& b)
+                     { return a.first - firsts[at(a.rank)] < b.first - firsts[at(b.rank)]; });
+    return parts_->cholesky->read_schur_complement(strips, take);
+  }
+  constexpr std::size_t at_once = 96; // columns
+  const Mat B = parts_->mumps->B;
+  for (std::size_t rank = 0; rank + 1 < firsts.size(); ++rank)
+    for (std::size_t first = firsts[rank], last = first; first < firsts[rank + 1]; first = last)
+    {
+      last = std::min(first + at_once, firsts[rank + 1]);
+      Eigen::MatrixXd units = Eigen::MatrixXd::Zero(parts_->border, static_cast<Eigen::Index>(last - first));
+      units.diagonal(-static_cast<Eigen::Index>(first)).setOnes();
+      const Eigen::MatrixXd columns = whole_product(B, parts_->mumps->factor.solve(transposed_product(B, units))),
+                            below = columns.bottomRows(static_cast<Eigen::Index>(n - first));
+      if (to_int(rank) == rank_of(parts_->comm)) take({first, last, n - first, below.data()});
+    }
 }
 
 std::vector<double> Factor::forward(std::span<const Vec> b) const
 {
-  Parts& parts = *parts_;
+  if (parts_->mumps)
+  {
+    auto& [factor, B, regular, x] = *parts_->mumps;
+    x = factor.solve(columns_of(b));
+    if (!B) return {};
+    const Eigen::MatrixXd seen = whole_product(B, x);
+    return parts_->on_rank_zero() ? std::vector<double>(seen.data(), seen.data() + seen.size()) : std::vector<double>();
+  }
   std::vector<const double*> own(b.size());
   for (std::size_t k = 0; k < b.size(); ++k) check(VecGetArrayRead(b[k], &own[k]));
-  std::vector<double> result;
-  if (parts.cholesky)
-    result = parts.cholesky->forward(own);
-  else
-  {
-    if (parts.on_rank_zero()) parts.right.resize(b.size() * static_cast<std::size_t>(parts.dofs));
-    for (std::size_t k = 0; k < b.size(); ++k)
-      MPI_Gatherv(own[k], parts.own_rows(), MPI_DOUBLE, parts.column(k), parts.layout.counts.data(),
-                  parts.layout.starts.data(), MPI_DOUBLE, 0, parts.comm);
-    result = parts.mumps->forward(parts.right, to_int(b.size()));
-  }
+  std::vector<double> result = parts_->cholesky->forward(own);
   for (std::size_t k = 0; k < b.size(); ++k) check(VecRestoreArrayRead(b[k], &own[k]));
   return result;
 }
 
 void Factor::backward(const std::vector<double>& lambda, std::span<const Vec> x) const
 {
-  Parts& parts = *parts_;
+  if (parts_->mumps)
+  {
+    auto& [factor, B, regular, solution] = *parts_->mumps;
+    std::vector<double> forces = lambda;
+    if (B) broadcast(forces, parts_->comm);
+    if (B)
+      solution.entries -=
+          factor.solve(transposed_product(B, Eigen::MatrixXd::Map(forces.data(), parts_->border, solution.columns())))
+              .entries;
+    for (std::size_t k = 0; k < x.size(); ++k) copy_column(solution, static_cast<Eigen::Index>(k), x[k]);
+    return;
+  }
   std::vector<double*> own(x.size());
   for (std::size_t k = 0; k < x.size(); ++k) check(VecGetArrayWrite(x[k], &own[k]));
-  if (parts.cholesky)
-    parts.cholesky->backward(lambda, own);
-  else
-  {
-    parts.mumps->backward(lambda, parts.right);
-    for (std::size_t k = 0; k < x.size(); ++k)
-      MPI_Scatterv(parts.column(k), parts.layout.counts.data(), parts.layout.starts.data(), MPI_DOUBLE, own[k],
-                   parts.own_rows(), MPI_DOUBLE, 0, parts.comm);
-  }
+  parts_->cholesky->backward(lambda, own);
   for (std::size_t k = 0; k < x.size(); ++k) check(VecRestoreArrayWrite(x[k], &own[k]));
 }
 
 double Factor::entries() const
 {
-  return parts_->cholesky ? parts_->cholesky->entries() : parts_->mumps->entries();
+  return parts_->cholesky ? parts_->cholesky->entries() : parts_->mumps->factor.entries();
 }
 
 std::shared_ptr<KnownAnalyses> no_analyses()
@@ -261,7 +276,6 @@ std::shared_ptr<KnownAnalyses> no_analyses()
 
 FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options)
 {
-  const int dofs = rows_of(A), border = rows_of(B);
   const MPI_Comm comm = comm_of(A);
   Plan plan = make_plan(A, B, options);
   FactorForecast forecast = multifrontal_forecast(plan.symbolic);
@@ -269,10 +283,9 @@ FactorForecast forecast_factor(Mat A, Mat B, const FactorOptions& options)
   forecast.kind = plan.kind;
   if (plan.kind == FactorKind::mumps)
   {
-    forecast.border_entries = 0;
     forecast.operations = operations_of(plan.symbolic) / ranks_of(comm);
     MPI_Bcast(&forecast.operations, 1, MPI_DOUBLE, 0, comm);
-    forecast.bytes = mumps_factor_memory({std::move(plan.entries), plan.symbolic.position, dofs, border, comm});
+    forecast.bytes = by_mumps(A).foreseen_memory();
   }
   else
   {

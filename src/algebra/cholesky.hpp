@@ -56,9 +56,6 @@ public:
   void read_schur_complement(std::span<const WantedColumns> strips,
                              const std::function<void(const CondensedStrip&)>& take) const;
 
-  /// E E' x; x is read and the product given on rank 0. Collective.
-  std::vector<double> schur_product(std::span<const double> x) const;
-
   /// E L^-1 b, on rank 0, of right-hand sides whose own rows are given; keeps L^-1 b. Collective.
   std::vector<double> forward(std::span<const double* const> b);
 
@@ -67,9 +64,6 @@ public:
 
   /// Entries of L and E on all ranks.
   double entries() const { return share_.symbolic.entries; }
-
-  /// Entries of E alone. Collective.
-  double border_entries() const;
 
 private:
   struct Work; // memory that elimination works in

@@ -123,7 +123,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Keep keep, const PencilOptions& options
     if (!symmetric) append_rows(A, 0, own);
     return parts.whole ? everywhere(std::move(own), parts.comm) : own;
   };
-  auto [entries, masses] = on_common_pattern(entries_of(K), entries_of(M));
+  auto [entries, masses] = on_common_pattern(entries_of(K), M ? entries_of(M) : Triplets{});
   parts.M = std::move(masses);
   parts.mumps =
       start_mumps(parts.whole ? MPI_COMM_SELF : parts.comm, symmetric ? MumpsSymmetry::symmetric : MumpsSymmetry::none);
@@ -132,7 +132,7 @@ PencilFactor::PencilFactor(Mat K, Mat M, Keep keep, const PencilOptions& options
   DMUMPS_STRUC_C& mumps = *parts.mumps;
   control(mumps, 14) = to_int(options.room);
   if (keep == Keep::count) control(mumps, 31) = 1; // the factor is discarded, front by front
-  set_controls_from_options(mumps, "modes_");
+  set_controls_from_options(mumps, options.prefix);
   mumps.perm_in = positions.data();
   parts.run_together([&] { run(mumps, MumpsJob::analyse); });
   mumps.perm_in = nullptr;
@@ -163,6 +163,18 @@ bool PencilFactor::factorise(double shift)
 int PencilFactor::negative_pivots() const
 {
   return number_of_negative_pivots(*parts_->mumps);
+}
+
+double PencilFactor::entries() const
+{
+  const int number = information(*parts_->mumps, 29); // a negative one counts millions
+  return number < 0 ? -1e6 * number : number;
+}
+
+double PencilFactor::foreseen_memory() const
+{
+  constexpr double megabyte = 1e6;
+  return megabyte * (information(*parts_->mumps, 17) + 1); // it is rounded down
 }
 
 MultiVector PencilFactor::solve(const MultiVector& X) const

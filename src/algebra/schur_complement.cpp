@@ -1,6 +1,5 @@
-/// Parts of the Schur complement E E' of a bordered factor, and products with it, from the rows of E that the factor
-/// holds. Nothing of its size is stored. Each rank adds up what its own subtrees give and, of shared supernodes, what
-/// its border rows give.
+/// Parts of the Schur complement E E' of a bordered factor, from the rows of E that the factor holds. Nothing of its
+/// size is stored. Each rank adds up what its own subtrees give and, of shared supernodes, what its border rows give.
 #include "cholesky.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/base/error.hpp"
@@ -22,8 +21,6 @@ struct BorderRows
   std::span<const int> positions; // in the order of elimination, of the rows after them; ascending
   int dofs;                       // positions before the border
 
-  std::size_t rows() const { return positions.size(); }
-  std::size_t row(std::size_t i) const { return at(positions[i] - dofs); } // of the border, from zero
   std::size_t pivots() const { return panel.columns; }
 };
 
@@ -139,22 +136,6 @@ void gather(const DenseRows& own, const std::vector<int>& border, std::size_t pi
   }
 }
 
-/// own -= E' x; x has the border's rows.
-void subtract_transposed_rows(const BorderRows& E, const double* x, double* own, std::vector<double>& part)
-{
-  part.assign(E.panel.rows + tile, 0.);
-  for (std::size_t i = 0; i < E.rows(); ++i) part[E.before + i] = x[E.row(i)];
-  subtract_transposed(E.panel, 1, part.data(), own);
-}
-
-/// y -= E times `own`; y has the border's rows.
-void subtract_rows(const BorderRows& E, const double* own, double* y, std::vector<double>& part)
-{
-  part.assign(E.panel.rows + tile, 0.);
-  subtract_product(E.panel, 1, own, part.data());
-  for (std::size_t i = 0; i < E.rows(); ++i) y[E.row(i)] += part[E.before + i];
-}
-
 /// Adds the parts of all ranks on one of them, in messages of moderate length. Collective.
 void sum_on(int rank, std::vector<double>& part, MPI_Comm comm)
 {
@@ -199,50 +180,6 @@ void Cholesky::read_schur_complement(std::span<const WantedColumns> strips,
     sum_on(rank, values, comm_);
     if (rank_of(comm_) == rank) take({begin, end, height, values.data()});
   }
-}
-
-std::vector<double> Cholesky::schur_product(std::span<const double> x) const
-{
-  const std::size_t own = share_.own;
-  std::vector<double> from(x.begin(), x.end()), result(at(share_.symbolic.border), 0.), part;
-  from.resize(result.size());
-  if (ranks_of(comm_) > 1) MPI_Bcast(from.data(), to_int(from.size()), MPI_DOUBLE, 0, comm_);
-  std::vector<BorderRows> shared;
-  std::vector<double> of_shared, pivots;
-  for (std::size_t k = own; k < share_.symbolic.supernodes.size(); ++k)
-  {
-    shared.push_back(border_rows(share_, k, values_));
-    const std::size_t begin = of_shared.size();
-    of_shared.resize(begin + shared.back().pivots(), 0.);
-    subtract_transposed_rows(shared.back(), from.data(), of_shared.data() + begin, part);
-  }
-  if (!shared.empty())
-    MPI_Allreduce(MPI_IN_PLACE, of_shared.data(), to_int(of_shared.size()), MPI_DOUBLE, MPI_SUM, comm_);
-  for (std::size_t begin = 0; const BorderRows& E : shared)
-  {
-    subtract_rows(E, of_shared.data() + begin, result.data(), part);
-    begin += E.pivots();
-  }
-  for (std::size_t k = 0; k < own; ++k)
-  {
-    const BorderRows E = border_rows(share_, k, values_);
-    if (E.rows() == 0) continue;
-    pivots.assign(E.pivots(), 0.);
-    subtract_transposed_rows(E, from.data(), pivots.data(), part);
-    subtract_rows(E, pivots.data(), result.data(), part);
-  }
-  sum_on(0, result, comm_);
-  if (rank_of(comm_) != 0) result.clear();
-  return result;
-}
-
-double Cholesky::border_entries() const
-{
-  double entries = 0;
-  for (const Supernode& supernode : share_.symbolic.supernodes)
-    entries += static_cast<double>(supernode.columns) * supernode.border;
-  MPI_Allreduce(MPI_IN_PLACE, &entries, 1, MPI_DOUBLE, MPI_SUM, comm_);
-  return entries;
 }
 
 } // namespace squeal

@@ -3,12 +3,15 @@
 #include "near_field.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/algebra/simd.hpp"
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
+#include "squeal/base/free_memory.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <Eigen/Core>
+#include <numeric>
 #include <string>
+#include <utility>
 
 namespace squeal
 {
@@ -39,59 +42,164 @@ SQUEAL_SIMD void add_whole_rows(const double* rows, std::size_t length, std::siz
   add_block(rows, length, number, factors, target);
 }
 
-SQUEAL_SIMD void add_runs(const NearField::PairRow& row, std::size_t number, const PairVector& factors, float* target)
+SQUEAL_SIMD void add_runs(const NearRow& row, std::size_t number, const PairVector& factors, float* target)
 {
-  const float* values = row.values.data();
-  for (const auto& [first, count] : row.runs)
+  for (const auto& [first, count, begin] : row.runs)
+    add_block(row.values.data() + begin, count, number, factors, target + first);
+}
+
+/// The turn in which each rank has the pairs of `order` from begins[rank] to ends[rank].
+Turn turn_of(const std::vector<std::size_t>& order, const std::vector<std::size_t>& begins,
+             const std::vector<std::size_t>& ends, MPI_Comm comm)
+{
+  Turn turn;
+  for (std::size_t rank = 0; rank < begins.size(); ++rank)
   {
-    add_block(values, count, number, factors, target + first);
-    values += number * count;
+    const std::size_t before = turn.order.size();
+    turn.order.insert(turn.order.end(), order.begin() + to_int(begins[rank]), order.begin() + to_int(ends[rank]));
+    turn.counts.push_back(to_int(ends[rank] - begins[rank]));
+    if (to_int(rank) != rank_of(comm)) continue;
+    turn.begin = before;
+    turn.end = turn.order.size();
   }
+  return turn;
 }
 
 } // namespace
 
-SQUEAL_SIMD void add_rows(const float* rows, std::size_t length, std::size_t number, const PairVector& factors,
-                          float* target)
+Turn all_pairs(std::size_t pairs)
 {
-  add_block(rows, length, number, factors, target);
+  Turn all{std::vector<std::size_t>(pairs), {to_int(pairs)}, 0, pairs};
+  std::iota(all.order.begin(), all.order.end(), 0);
+  return all;
+}
+
+std::vector<std::size_t> column_shares(std::size_t rows, MPI_Comm comm)
+{
+  constexpr std::size_t together = 24; // columns: whole pairs of two or three rows, and whole tiles
+  const int ranks = ranks_of(comm);
+  std::vector<std::size_t> firsts;
+  for (int rank = 0; rank < ranks; ++rank) // (1 - column/rows)^2 = 1 - rank/ranks
+    firsts.push_back(
+        static_cast<std::size_t>((1 - std::sqrt(1 - static_cast<double>(rank) / ranks)) * static_cast<double>(rows)) /
+        together * together);
+  firsts.push_back(rows);
+  return firsts;
+}
+
+bool is_worth_sharing(double rows, int ranks)
+{
+  return ranks > 1 && rows >= 1000;
+}
+
+ContactOperator::ContactOperator(std::vector<double> columns, int pairs, int directions, MPI_Comm comm)
+    : directions_(directions), columns_(std::move(columns))
+{
+  const std::size_t rows = PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs));
+  const std::vector<std::size_t> shares = column_shares(rows, comm);
+  first_ = shares[static_cast<std::size_t>(rank_of(comm))];
+  last_ = shares[static_cast<std::size_t>(rank_of(comm)) + 1];
+  if (ranks_of(comm) > 1) shared_by_ = comm;
+  const CondensedStrip own{first_, last_, rows - first_, columns_.data()};
+  set_diagonal(own, comm);
+  if (rows > fits_the_cache) set_near_field(own, comm);
+  if (near_.empty()) side_by_side_ = in_sequence_ = {all_pairs(diagonal_.size())};
+}
+
+void ContactOperator::set_diagonal(const CondensedStrip& own, MPI_Comm comm)
+{
+  const PairRows<std::size_t> rows(directions_);
+  std::vector<PairBlock> blocks;
+  for (std::size_t pair = rows.pair_of(first_); pair < rows.pair_of(last_); ++pair)
+    blocks.push_back(block_of(own, rows, pair, pair));
+  for (int rank = 0; rank < ranks_of(comm); ++rank)
+  {
+    std::vector<PairBlock> part = blocks;
+    broadcast(part, comm, rank);
+    diagonal_.insert(diagonal_.end(), part.begin(), part.end());
+  }
+  double largest = 0;
+  for (const PairBlock& A : diagonal_)
+    for (std::size_t k = 0; k < 3; ++k) largest = std::max(largest, A[k][k]);
+  for (const PairBlock& A : diagonal_) scale_.push_back(natural_scale(A, largest));
+}
+
+void ContactOperator::set_near_field(const CondensedStrip& own, MPI_Comm comm)
+{
+  NearField near = make_near_field(own, pairs(), directions_, comm);
+  near_ = std::move(near.rows);
+  const std::vector<std::size_t> begins(near.of_ranks.begin(), near.of_ranks.end() - 1),
+      ends(near.of_ranks.begin() + 1, near.of_ranks.end());
+  std::vector<std::size_t> middles;
+  for (std::size_t rank = 0; rank < begins.size(); ++rank) middles.push_back((begins[rank] + ends[rank]) / 2);
+  for (std::size_t rank = 0; rank < begins.size(); ++rank)
+  {
+    if (begins[rank] == ends[rank]) continue;
+    std::vector<std::size_t> alone = begins;
+    alone[rank] = ends[rank];
+    in_sequence_.push_back(turn_of(near.order, begins, alone, comm));
+  }
+  side_by_side_ = in_sequence_;
+  if (in_sequence_.size() > 1)
+    side_by_side_ = {turn_of(near.order, begins, middles, comm), turn_of(near.order, middles, ends, comm)};
 }
 
 void ContactOperator::multiply(std::span<const double> x, std::span<double> y) const
 {
-  if (products_) return multiply_by_factor(x, y);
-  std::vector<double> from(x.begin(), x.end()), to(x.size());
-  multiply_stored(from, to);
+  const std::vector<double> from(x.begin(), x.end());
+  std::vector<double> to(x.size());
+  add_symmetric_product(columns_.data(), size() - first_, last_ - first_, from.data() + first_, to.data() + first_);
+  if (shared_by_ != MPI_COMM_NULL)
+  {
+    const bool first = rank_of(shared_by_) == 0; // a sum on all ranks may differ in the last bit
+    MPI_Reduce(first ? MPI_IN_PLACE : to.data(), to.data(), to_int(to.size()), MPI_DOUBLE, MPI_SUM, 0, shared_by_);
+    MPI_Bcast(to.data(), to_int(to.size()), MPI_DOUBLE, 0, shared_by_);
+  }
   std::ranges::copy(to, y.begin());
+}
+
+void ContactOperator::multiply_alone(std::span<const double> x, std::span<double> y) const
+{
+  std::ranges::fill(y, 0.);
+  add_symmetric_product(entries().data(), size(), size(), x.data(), y.data());
+}
+
+void ContactOperator::hold_whole() const
+{
+  if (shared_by_ == MPI_COMM_NULL || held_whole_) return;
+  const std::size_t rows = size();
+  held_whole_ = true;
+  on_rank_zero(shared_by_, [&] { whole_.resize(rows * rows); });
+  if (rank_of(shared_by_) != 0) return send(columns_, 0, shared_by_);
+  const std::vector<std::size_t> shares = column_shares(rows, shared_by_);
+  std::vector<double> received;
+  for (int rank = 0; rank < ranks_of(shared_by_); ++rank)
+  {
+    if (rank > 0) receive(received, rank, shared_by_);
+    const std::size_t first = shares[static_cast<std::size_t>(rank)];
+    const double* column = rank > 0 ? received.data() : columns_.data();
+    for (std::size_t j = first; j < shares[static_cast<std::size_t>(rank) + 1]; ++j, column += rows - first)
+      for (std::size_t i = j; i < rows; ++i) whole_[i * rows + j] = whole_[j * rows + i] = column[i - first];
+  }
 }
 
 void ContactOperator::add_product(std::size_t pair, const PairVector& change, std::span<double> w) const
 {
-  const PairMatrixView W(values_, pairs(), directions_);
+  const PairMatrixView W(entries(), pairs(), directions_);
   add_whole_rows(W.row(pair, 0).data(), size(), W.rows_per_pair(), change, w.data());
 }
 
-void ContactOperator::add_near_product(std::size_t pair, const PairVector& change, std::span<float> w) const
+void ContactOperator::add_product(std::size_t pair, const PairVector& change, std::span<float> w) const
 {
-  add_product_in_patch(pair, change, w);
-  add_runs(near_.outside[pair], PairRows<std::size_t>(directions_).per_pair(), change, w.data());
-}
-
-void ContactOperator::add_product_in_patch(std::size_t pair, const PairVector& change, std::span<float> w) const
-{
-  add_runs(near_.inside[pair], PairRows<std::size_t>(directions_).per_pair(), change, w.data());
-}
-
-void ContactOperator::add_product_beyond_patch(std::size_t pair, const PairVector& change, std::span<float> w) const
-{
-  const NearField::PairRow& row = shares_patches() ? beyond_[pair] : near_.outside[pair];
-  add_runs(row, PairRows<std::size_t>(directions_).per_pair(), change, w.data());
+  add_runs(near_[pair], PairRows<std::size_t>(directions_).per_pair(), change, w.data());
 }
 
 double ContactOperator::near_share() const
 {
   const auto n = static_cast<double>(size());
-  return n == 0 ? 0 : static_cast<double>(near_.entries()) / (n * n);
+  double entries = 0;
+  for (const NearRow& row : near_) entries += static_cast<double>(row.values.size());
+  return n == 0 ? 0 : entries / (n * n);
 }
 
 double ContactOperator::largest_eigenvalue(std::span<const double> roots, int iterations) const
@@ -113,100 +221,42 @@ double ContactOperator::largest_eigenvalue(std::span<const double> roots, int it
   return largest;
 }
 
-void ContactOperator::set_diagonal(std::vector<PairBlock> blocks)
-{
-  diagonal_ = std::move(blocks);
-  double largest = 0;
-  for (const PairBlock& A : diagonal_)
-    for (std::size_t k = 0; k < 3; ++k) largest = std::max(largest, A[k][k]);
-  for (const PairBlock& A : diagonal_) scale_.push_back(natural_scale(A, largest));
-}
-
 ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions)
 {
-  const auto count = static_cast<std::size_t>(pairs);
-  const PairMatrixView view(W, count, directions);
+  const PairMatrixView view(W, static_cast<std::size_t>(pairs), directions);
   const std::size_t n = view.size();
   if (W.size() != n * n)
     throw Error("contact: " + std::to_string(pairs) + " pairs of " + std::to_string(view.rows_per_pair()) +
                 " rows need " + std::to_string(n * n) + " entries of W, not " + std::to_string(W.size()));
-  ContactOperator op;
-  op.pairs_ = count;
-  op.directions_ = directions;
-  if (n > fits_the_cache)
-  {
-    NearFieldBuilder builder(count, directions, PETSC_COMM_SELF);
-    const CondensedStrip whole{0, n, n, W.data()};
-    builder.measure(whole);
-    builder.agree();
-    builder.collect(whole);
-    op.near_ = builder.finish();
-    op.set_diagonal(builder.diagonal());
-  }
-  else
-  {
-    std::vector<PairBlock> blocks;
-    for (std::size_t pair = 0; pair < count; ++pair) blocks.push_back(view.block(pair, pair));
-    op.set_diagonal(std::move(blocks));
-  }
-  op.values_ = std::move(W);
-  return op;
+  return {std::move(W), pairs, directions, PETSC_COMM_SELF};
 }
 
-bool stays_in_factor(double rows, double border_entries, double free)
+ContactOperator make_contact_operator(const Factor& factor, double scale, const std::vector<double>& added, int pairs,
+                                      int directions, MPI_Comm comm)
 {
-  const double half = rows * rows / 2; // of a symmetric W, which a product reads; or E twice
-  return 2 * border_entries < half || sizeof(double) * 2 * half > free / 4;
-}
-
-ContactOperator make_contact_operator(const ScaledProducts& W, OperatorStorage storage, int pairs, int directions,
-                                      MPI_Comm comm)
-{
-  ContactOperator op;
-  const bool by_factor = storage == OperatorStorage::by_factor;
-  NearFieldBuilder builder(static_cast<std::size_t>(pairs), directions, by_factor ? PETSC_COMM_SELF : comm);
-  std::vector<double> values;
-  const auto scaled = [&](const CondensedStrip& strip)
+  const std::size_t rows = PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs));
+  std::vector<double> columns;
+  if (!is_worth_sharing(static_cast<double>(rows), ranks_of(comm)))
   {
-    values.assign(strip.values, strip.values + (strip.last - strip.first) * strip.height);
-    for (double& entry : values) entry *= W.scale;
-    for (std::size_t j = strip.first; !W.diagonal.empty() && j < strip.last; ++j)
-      values[(j - strip.first) * (strip.height + 1)] += W.diagonal[j];
-    return CondensedStrip{strip.first, strip.last, strip.height, values.data()};
-  };
-  const bool first = rank_of(comm) == 0;
-  if (by_factor)
-  {
-    op.products_ = W;
-    if (ranks_of(comm) > 1) op.shared_by_ = comm;
-    W.products.read([&](const CondensedStrip& strip) { builder.measure(scaled(strip)); });
-    if (first) builder.agree();
-    W.products.read([&](const CondensedStrip& strip) { builder.collect(scaled(strip)); });
-    if (first) op.near_ = builder.finish();
+    columns = factor.condensed(scale);
+    for (std::size_t i = 0; i < added.size() && !columns.empty(); ++i) columns[i * (rows + 1)] += added[i];
+    return rank_of(comm) == 0 ? make_contact_operator(std::move(columns), pairs, directions) : ContactOperator();
   }
-  else
-  {
-    const std::size_t rows = PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs));
-    W.products.read(
-        [&](const CondensedStrip& strip)
-        {
-          const CondensedStrip now = scaled(strip);
-          builder.measure(now);
-          op.append_strips(now);
-        },
-        op.share_columns(rows, comm));
-    builder.agree();
-    op.for_each_strip([&](const CondensedStrip& strip) { builder.collect(strip); });
-    op.near_ = builder.finish();
-  }
-  if (first)
-  {
-    op.pairs_ = static_cast<std::size_t>(pairs);
-    op.directions_ = directions;
-    op.set_diagonal(builder.diagonal());
-  }
-  if (op.shared_by_ != MPI_COMM_NULL) op.share_patches();
-  return op;
+  const std::vector<std::size_t> shares = column_shares(rows, comm);
+  const std::size_t first = shares[static_cast<std::size_t>(rank_of(comm))],
+                    last = shares[static_cast<std::size_t>(rank_of(comm)) + 1], height = rows - first;
+  columns = vector_on_large_pages((last - first) * height);
+  columns.resize((last - first) * height);
+  factor.read_condensed(
+      [&](const CondensedStrip& strip)
+      {
+        for (std::size_t j = strip.first; j < strip.last; ++j)
+          for (std::size_t i = j; i < rows; ++i)
+            columns[(j - first) * height + i - first] =
+                scale * strip.entry(i, j) + (i == j && !added.empty() ? added[i] : 0);
+      },
+      shares);
+  return {std::move(columns), pairs, directions, comm};
 }
 
 } // namespace squeal

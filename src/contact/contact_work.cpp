@@ -1,8 +1,5 @@
 #include "contact_work.hpp"
 
-#include "squeal/base/broadcast.hpp"
-#include "squeal/base/checkpoint.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -41,40 +38,6 @@ void form_product(ContactWork& work)
   work.Wr.resize(work.r.size());
   ++work.reads;
   work.W.multiply(work.r, work.Wr);
-}
-
-namespace
-{
-
-void describe(Checkpoint& checkpoint, FrictionLaw& law)
-{
-  describe_all(checkpoint, law.coefficient, law.static_coefficient, law.decay_speed, law.factor_at_speed.at,
-               law.factor_at_speed.value);
-}
-
-/// The laws as numbers, without those of each pair.
-void describe_laws(Checkpoint& checkpoint, PairFriction& friction)
-{
-  std::size_t own = friction.own.size();
-  checkpoint.pass_size(own);
-  friction.own.resize(own);
-  describe(checkpoint, friction.common);
-  for (FrictionLaw& law : friction.own) describe(checkpoint, law);
-}
-
-} // namespace
-
-PairFriction announced_friction(PairFriction friction, MPI_Comm comm)
-{
-  Checkpoint written;
-  describe_laws(written, friction);
-  std::vector<double> numbers = written.numbers();
-  broadcast(numbers, comm);
-  Checkpoint read(std::move(numbers));
-  describe_laws(read, friction);
-  broadcast(friction.number_of_own, comm);
-  broadcast(friction.contact, comm);
-  return friction;
 }
 
 } // namespace squeal

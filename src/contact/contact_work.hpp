@@ -46,10 +46,11 @@ double defect_of(const ContactWork& work, std::size_t pair, const PairVector& w,
 /// The largest defect of all pairs.
 double residual_of(const ContactWork& work);
 
-/// Returns the laws that rank 0 gives. Collective.
-PairFriction announced_friction(PairFriction friction, MPI_Comm comm);
-
-/// Forms W r.
+/// Forms W r. Collective of the ranks that share W.
 void form_product(ContactWork& work);
+
+/// Block Gauss-Seidel (src/README.md, section 4.7). W r must be fresh, and is in the end. Collective of the ranks that
+/// share W.
+void gauss_seidel(ContactWork& work, const ContactSettings& settings);
 
 } // namespace squeal

@@ -1,6 +1,6 @@
 #include "squeal/contact/solver.hpp"
 
-#include "gauss_seidel.hpp"
+#include "contact_work.hpp"
 #include "squeal/base/error.hpp"
 
 #include <algorithm>
@@ -109,14 +109,13 @@ ContactResult solve_contact(const ContactOperator& W, const PairFriction& fricti
 {
   ContactWork work = start(W, friction, problem);
   if (W.pairs() == 0) return {0, 0, true};
-  const bool sweeps = settings.solver == ContactSolver::gauss_seidel;
-  if (sweeps)
+  if (settings.solver == ContactSolver::gauss_seidel)
   {
     if (!start_warm(work, problem.memory)) form_product(work);
     gauss_seidel(work, settings);
   }
-  // sweeps over the near field may not converge where friction is strong
-  if (!sweeps || (!W.is_stored() && !work.result.converged)) fixed_point(work, settings);
+  else
+    fixed_point(work, settings);
   remember(work, problem.memory);
   return work.result;
 }

@@ -1,5 +1,6 @@
 #include "step_contact.hpp"
 
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/contact/sliding_direction.hpp"
 
@@ -19,7 +20,7 @@ struct StartOfStep
 };
 
 /// From B v_free of a trajectory: normal rows become gap rates (g0 + B_n ut)/h + B_n v_free, tangential ones sliding
-/// velocities, rows with a compliance as in section 4.16. On rank 0; empty elsewhere.
+/// velocities, rows with a compliance as in section 4.16. Empty where W is not.
 std::vector<double> free_contact_velocity(const StepBatch& batch, const StartOfStep& start, std::vector<double> b)
 {
   const auto& [step, interface, factors, works, states, reports] = batch;
@@ -63,7 +64,7 @@ void hold_anchors(const Interface& interface, const std::vector<double>& positio
   }
 }
 
-/// Adds (B_t ut - a)/h to the tangential rows of pairs that are held at a. On rank 0; elsewhere b is empty.
+/// Adds (B_t ut - a)/h to the tangential rows of pairs that are held at a. Where W is not, b is empty.
 void lead_back(const StepBatch& batch, const std::vector<double>& position, const StickAnchors& anchors,
                std::vector<double>& b)
 {
@@ -79,7 +80,7 @@ void lead_back(const StepBatch& batch, const std::vector<double>& position, cons
 /// One trajectory's problem: w = W r + free + past.
 struct StepProblem
 {
-  std::vector<double> free; // on rank 0
+  std::vector<double> free; // where W is
   std::vector<double> past; // as sliding_direction.hpp says
 };
 
@@ -204,12 +205,10 @@ void record_contact(const Interface& interface, const State& state, const std::v
     record.gap[i] += PairView(position, interface.directions).normal(i);
 }
 
-/// Solves contact of all trajectories on rank 0, for which all ranks form products with W. Returns the text of an
-/// error, on rank 0.
+/// Solves contact of all trajectories on rank 0, or on the ranks that share W. Returns the text of an error.
 std::string solve_all(const StepBatch& batch, std::vector<StepProblem>& problems)
 {
-  const ServedProducts served(batch.step.W);
-  if (rank_of(comm_of(batch.interface.B)) != 0) return {};
+  if (batch.step.W.shared_by() == MPI_COMM_NULL && rank_of(comm_of(batch.interface.B)) != 0) return {};
   try
   {
     for (std::size_t k = 0; k < problems.size(); ++k)
@@ -260,8 +259,9 @@ std::vector<ContactStatus> status_with(const Interface& interface, const PairFri
   return contact_status(PairView(reactions, interface.directions), PairView(velocity, interface.directions), friction);
 }
 
-void find_reactions(const StepBatch& batch, const std::vector<double>& Bv_free)
+void find_reactions(const StepBatch& batch, std::vector<double> Bv_free)
 {
+  if (const MPI_Comm sharing = batch.step.W.shared_by(); sharing != MPI_COMM_NULL) broadcast(Bv_free, sharing);
   std::vector<StepProblem> problems = make_problems(batch, Bv_free);
   share_from_rank_zero(batch, solve_all(batch, problems));
   for (std::size_t k = 0; k < problems.size(); ++k)

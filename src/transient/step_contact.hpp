@@ -27,6 +27,6 @@ std::vector<ContactStatus> status_with(const Interface& interface, const PairFri
 
 /// Reactions at the end of the step, into the states of every rank, and what the reports say of contact. `Bv_free`: B v
 /// of the steps without reactions, one trajectory after the other, on rank 0. Overwrites v_theta. Collective.
-void find_reactions(const StepBatch& batch, const std::vector<double>& Bv_free);
+void find_reactions(const StepBatch& batch, std::vector<double> Bv_free);
 
 } // namespace squeal

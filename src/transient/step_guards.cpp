@@ -65,13 +65,8 @@ double fall_of_friction(const ThetaStep& step, const Interface& interface, const
     std::ranges::fill(
         weights.tangential(i),
         std::sqrt(steepest_fall(friction.of(i)) * std::max(0., PairView(reactions, interface.directions).normal(i))));
-  double largest = 0;
-  on_every_rank(comm_of(interface.B),
-                [&]
-                {
-                  const ServedProducts served(step.W);
-                  if (rank_of(comm_of(interface.B)) == 0) largest = step.W.largest_eigenvalue(roots, passes);
-                });
+  double largest = 0; // 0 where W is not
+  on_every_rank(comm_of(interface.B), [&] { largest = step.W.largest_eigenvalue(roots, passes); });
   MPI_Bcast(&largest, 1, MPI_DOUBLE, 0, comm_of(interface.B));
   return largest;
 }

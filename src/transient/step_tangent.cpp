@@ -232,12 +232,8 @@ std::vector<StepRecord> record_steps(const ThetaStep& step, const Structure& str
 void advance_tangents(const ThetaStep& step, const Structure& structure, const Interface& interface,
                       std::span<const StepRecord> records, std::span<TangentColumn> columns)
 {
-  std::vector<double> formed;
-  if (step.W.is_stored())
-    step.W.hold_whole();
-  else
-    formed = whole_operator(step, interface);
-  const std::span<const double> W = step.W.is_stored() ? step.W.entries() : formed;
+  step.W.hold_whole();
+  const std::span<const double> W = step.W.entries();
   constexpr double part = 0.25; // of the free memory
   double room = part * free_memory(comm_of(structure.load));
   for (std::size_t first = 0; first < columns.size(); first += at_once)

@@ -275,33 +275,7 @@ std::vector<double> added_by_compliance(const ThetaStep& step, const Interface& 
   return added;
 }
 
-ContactOperator condensed_operator(const ThetaStep& step, const Interface& interface)
-{
-  if (interface.pairs == 0) return {};
-  const MPI_Comm comm = comm_of(interface.B);
-  const auto products = step.factor.condensed_products();
-  const auto rows = static_cast<double>(interface.size());
-  const bool by_factor = products && stays_in_factor(rows, products->entries(), free_memory(comm));
-  if (by_factor || (products && is_worth_sharing(rows, ranks_of(comm))))
-    return make_contact_operator({*products, step.h, added_by_compliance(step, interface)},
-                                 by_factor ? OperatorStorage::by_factor : OperatorStorage::whole, interface.pairs,
-                                 interface.directions, comm);
-  ContactOperator W;
-  std::vector<double> entries = whole_operator(step, interface);
-  if (rank_of(comm) == 0) W = make_contact_operator(std::move(entries), interface.pairs, interface.directions);
-  W.share(comm);
-  return W;
-}
-
 } // namespace
-
-std::vector<double> whole_operator(const ThetaStep& step, const Interface& interface)
-{
-  std::vector<double> W = step.factor.condensed(step.h);
-  const std::vector<double> added = added_by_compliance(step, interface);
-  for (std::size_t i = 0; i < added.size() && !W.empty(); ++i) W[i * added.size() + i] += added[i];
-  return W;
-}
 
 ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta,
                           const StepOptions& options)
@@ -315,7 +289,9 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   step.contact = options.contact;
   step.factor = factor_held(step_matrix(structure, h, theta), interface, structure.names, options.factor);
   step.factor_seconds = MPI_Wtime() - start;
-  step.W = condensed_operator(step, interface);
+  if (interface.pairs > 0)
+    step.W = make_contact_operator(step.factor, h, added_by_compliance(step, interface), interface.pairs,
+                                   interface.directions, comm_of(interface.B));
   step.matrices = pair_matrices(structure.M, structure.K);
   step.condensed_seconds = MPI_Wtime() - start - step.factor_seconds;
   return_freed_memory(); // fronts of the factor, and what W was added up from

@@ -202,20 +202,6 @@ void check_agreement(FactorKind kind, const test::Rows& K, std::size_t rows, std
   const std::vector<double> exact = dense_condensed(K, B, 2), condensed = factor.condensed(2);
   CHECK(condensed.empty() == !here);
   if (here) CHECK(largest_difference(condensed, exact) < 1e-12);
-  CHECK(factor.condensed_products().has_value() == (kind == FactorKind::supernodal));
-  if (const auto products = factor.condensed_products())
-  {
-    std::vector<double> x(rows);
-    for (std::size_t i = 0; i < rows; ++i) x[i] = std::cos(static_cast<double>(i));
-    const std::vector<double> y = products->product(x);
-    CHECK(y.empty() == !here);
-    for (std::size_t i = 0; i < y.size(); ++i)
-    {
-      double sum = 0;
-      for (std::size_t j = 0; j < rows; ++j) sum += exact[i * rows + j] / 2 * x[j];
-      CHECK(std::abs(y[i] - sum) < 1e-11);
-    }
-  }
 
   std::vector<Owned<Vec>> loads, solutions;
   std::vector<Vec> b, x;

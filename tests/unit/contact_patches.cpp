@@ -1,7 +1,5 @@
 // ranks: 1 2 3 4
-// Sweeps patch by patch. What ranks do side by side is arithmetic on the same numbers in the same order; products with
-// W alone add up in another order, 1e-15 of a reaction a product, and a residual of 1e-10 leaves 1e-8 of a reaction
-// where cond(W) < 100.
+// Sweeps of ranks that share W: a residual of 1e-10 leaves 1e-8 of a reaction where cond(W) < 100.
 #include "../support/contact_problem.hpp"
 
 #include <algorithm>
@@ -46,13 +44,22 @@ Vector velocity()
   return b;
 }
 
-/// On all ranks.
+/// W on all ranks, each from its own columns of entry(row, column).
+template <class Entry> ContactOperator shared_of(Entry entry, std::size_t of_pairs, int directions)
+{
+  const std::size_t rows = of_pairs * (1 + static_cast<std::size_t>(directions));
+  const std::vector<std::size_t> shares = column_shares(rows, PETSC_COMM_WORLD);
+  const auto me = static_cast<std::size_t>(rank_of(PETSC_COMM_WORLD));
+  Vector columns;
+  for (std::size_t j = shares[me]; j < shares[me + 1]; ++j)
+    for (std::size_t i = shares[me]; i < rows; ++i) columns.push_back(entry(i, j));
+  return {columns, static_cast<int>(of_pairs), directions, PETSC_COMM_WORLD};
+}
+
 ContactOperator shared(const Vector& dense, std::size_t of_pairs, int directions)
 {
-  ContactOperator W;
-  if (rank_of(PETSC_COMM_WORLD) == 0) W = make_contact_operator(dense, static_cast<int>(of_pairs), directions);
-  W.share(PETSC_COMM_WORLD);
-  return W;
+  const std::size_t rows = of_pairs * (1 + static_cast<std::size_t>(directions));
+  return shared_of([&](std::size_t i, std::size_t j) { return dense[i * rows + j]; }, of_pairs, directions);
 }
 
 constexpr std::size_t large = 1100; // pairs of a patch that ranks divide
@@ -87,27 +94,29 @@ Vector velocity_of_line(std::size_t stride)
 
 } // namespace
 
-TEST_CASE("ranks sweep over a single large patch by pieces, to the answer of one rank")
+TEST_CASE("ranks sweep over slices of a large contact side by side, to the answer of one rank")
 {
   for (const std::size_t stride : {1U, 7U}) // pairs numbered from end to end, and not
   {
     const Vector dense = compliance_of_line(stride, 0.5, 0);
     const ContactOperator W = shared(dense, large, 1);
-    const ServedProducts served(W);
-    if (rank_of(PETSC_COMM_WORLD) != 0) continue;
-    const bool divided = ranks_of(PETSC_COMM_WORLD) > 1;
-    CHECK(W.patches_take_turns() == divided);
-    CHECK(W.patches().size() == (divided ? 4 : 1));
+    const std::size_t sweeping = std::min<std::size_t>(2, static_cast<std::size_t>(ranks_of(PETSC_COMM_WORLD)));
+    REQUIRE(W.side_by_side().size() == sweeping); // 500 pairs a rank, and two slices each
+    CHECK(W.in_sequence().size() == sweeping);
     // slices of the line, from either end; pairs up to four places away are neighbours, among which slices part
     constexpr int reach = 4, length = large / 4;
-    const auto is_in = [&](std::size_t place, std::size_t piece)
+    const auto is_in = [&](std::size_t place, std::size_t slice)
     {
-      const int from_start = static_cast<int>(place) - length * static_cast<int>(piece);
+      const int from_start = static_cast<int>(place) - length * static_cast<int>(slice);
       return from_start >= -reach && from_start < length + reach;
     };
-    for (std::size_t piece = 0; divided && piece < 4; ++piece)
-      for (const std::size_t pair : W.patches()[piece])
-        CHECK((is_in(pair * stride % large, piece) || is_in(large - 1 - pair * stride % large, piece)));
+    for (std::size_t turn = 0; sweeping > 1 && turn < 2; ++turn)
+      for (std::size_t place = 0; place < W.side_by_side()[turn].order.size(); ++place)
+      {
+        const std::size_t pair = W.side_by_side()[turn].order[place],
+                          slice = turn + (place < static_cast<std::size_t>(W.side_by_side()[turn].counts[0]) ? 0 : 2);
+        CHECK((is_in(pair * stride % large, slice) || is_in(large - 1 - pair * stride % large, slice)));
+      }
     const ContactOperator alone = make_contact_operator(dense, large, 1);
     const Vector b = velocity_of_line(stride);
     Vector together, exact;
@@ -123,90 +132,63 @@ TEST_CASE("ranks sweep over a single large patch by pieces, to the answer of one
   }
 }
 
-TEST_CASE("a large patch whose pieces would push each other as strongly as themselves stays whole")
+TEST_CASE("one rank sweeps over a large contact whose slices would push each other as strongly as themselves")
 {
-  // Of a motion of all pairs alike, a piece of 275 feels 275/(275 + 4) of its own push from the one beside it.
+  // Of a motion of all pairs alike, a slice of 275 feels 275/(275 + 4) of its own push from the one beside it.
   const Vector dense = compliance_of_line(1, 0.5, 1);
   const ContactOperator W = shared(dense, large, 1);
-  const ServedProducts served(W);
-  if (rank_of(PETSC_COMM_WORLD) != 0) return;
-  CHECK(W.patches().size() == 1);
+  CHECK(W.side_by_side().size() == 1);
+  CHECK(W.side_by_side()[0].counts[0] == large);
   const Vector b = velocity_of_line(1);
   Vector r;
   CHECK(solve_contact(W, b, {0.3}, {}, r).converged);
   CHECK(contact_residual(make_contact_operator(dense, large, 1), FrictionLaw{0.3}, b, r) < 1.01e-10);
 }
 
-TEST_CASE("ranks sweep over patches side by side, to the answer of one rank")
+TEST_CASE("bodies that act on each other a little have the answer of one rank on all, and that of the fixed point")
 {
-  const MPI_Comm comm = PETSC_COMM_WORLD;
-  for (const std::size_t bodies : {2U, 5U}) // two: some ranks have none
+  // of all others together on a pair, over its own body: 0.05 to 0.1; or each of four other bodies with 81 pairs:
+  // 4 * 81 * 0.01 = 3.2 beside 1 + 2 sum of exp(-1.2 k) = 1.9 of its own
+  for (const double between : {4e-4, 1e-2})
   {
-    // of all others together on a pair, over its own body: 0.05 to 0.1
-    const Vector dense = compliance_of_bodies(bodies, 4e-4);
-    const ContactOperator W = shared(dense, pairs, 2);
-    CHECK(W.patches().size() == bodies);
-    CHECK(W.shares_patches() == (ranks_of(comm) > 1));
-    for (std::size_t patch = 0; patch < bodies; ++patch)
-      for (const std::size_t pair : W.patches()[patch]) CHECK(pair % bodies == patch);
-    const ServedProducts served(W);
-    if (rank_of(comm) != 0) continue;
-    const ContactOperator alone = make_contact_operator(dense, pairs, 2);
-    {
-      Vector b = velocity(), together, exact;
-      b[3 * 7] = 0.5; // a pair that opens
-      const ContactResult result = solve_contact(W, b, {0.4}, {}, together),
-                          of_one = solve_contact(alone, b, {0.4}, {}, exact);
-      CHECK(result.converged);
-      CHECK(result.iterations == of_one.iterations);
-      CHECK(contact_residual(alone, FrictionLaw{0.4}, b, together) < 1.01e-10);
-      CHECK(difference(together, exact) < 1e-12 * *std::max_element(exact.begin(), exact.end()));
-      CHECK(std::count(exact.begin(), exact.end(), 0.) > 30); // some pairs are open
-    }
+    const Vector dense = compliance_of_bodies(5, between);
+    const ContactOperator W = shared(dense, pairs, 2), alone = make_contact_operator(dense, pairs, 2);
+    Vector b = velocity(), together, exact, projected;
+    b[3 * 7] = 0.5; // a pair that opens
+    CHECK(solve_contact(W, b, {0.4}, {}, together).converged);
+    CHECK(solve_contact(alone, b, {0.4}, {}, exact).converged);
+    CHECK(solve_contact(W, b, {0.4}, {ContactSolver::fixed_point, 1e-12, 100000, 0}, projected).converged);
+    const double largest = *std::max_element(exact.begin(), exact.end());
+    CHECK(contact_residual(alone, FrictionLaw{0.4}, b, together) < 1.01e-10);
+    CHECK(difference(together, exact) < 1e-8 * largest);
+    CHECK(difference(together, projected) < 1e-7 * largest);
+    CHECK(std::count(exact.begin(), exact.end(), 0.) > 30); // some pairs are open
   }
 }
 
-TEST_CASE("where patches act on each other by more than their blocks say, all pairs are swept as one")
+TEST_CASE("where slices act on each other by more than their blocks say, ranks sweep one after the other")
 {
-  // Each body moves as a whole, and all of them together by x, which changes sign from pair to pair. By sums of blocks
-  // the others act on a body by 304 * 0.08/(1 + 100 * 1.0) = 0.23 of itself, but x grows by 3 * 8.1/(8.1 + 5) = 1.9
-  // a round.
-  const std::size_t bodies = 4, of_one = pairs / bodies;
-  Vector dense(size * size, 0.);
-  for (std::size_t i = 0; i < size; ++i)
-    for (std::size_t j = 0; j < size; ++j)
-    {
-      const std::size_t a = i / 3, b = j / 3, body = std::min(a / of_one, bodies - 1);
-      if (i == j) dense[i * size + j] += 5;
-      if (i % 3 != 0 || j % 3 != 0) continue;
-      if (body == std::min(b / of_one, bodies - 1)) dense[i * size + j] += 1;
-      dense[i * size + j] += 0.08 * (a % 2 == b % 2 ? 1 : -1);
-    }
-  const ContactOperator W = shared(dense, pairs, 2);
-  CHECK(W.patches().size() == bodies);
-  const ServedProducts served(W);
-  if (rank_of(PETSC_COMM_WORLD) != 0) return;
-  Vector b(size, 0.), r;
-  for (std::size_t pair = 0; pair < pairs; ++pair) b[3 * pair] = -1.5 + std::cos(static_cast<double>(pair * pair % 17));
+  // Each slice moves as a whole, and all of them together by x, which changes sign from pair to pair. By sums of blocks
+  // the two others of a turn act on a pair by 2 * 250 * 0.08/(5 + 250) = 0.16 of its own slice. But with
+  // c = 250 * 0.08/(5 + 250 * 0.08) = 0.8 of its own, x grows by 2 c = 1.6 a round.
+  const auto ranks = std::min<std::size_t>(3, static_cast<std::size_t>(ranks_of(PETSC_COMM_WORLD)));
+  const std::size_t of_all = 500 * std::max<std::size_t>(ranks, 2);
+  const auto entry = [&](std::size_t i, std::size_t j)
+  {
+    const std::size_t a = i / 2, b = j / 2;
+    const double own = i == j ? 5 : 0, slice = a / 250 == b / 250 ? 1 : 0, all = a % 2 == b % 2 ? 0.08 : -0.08;
+    return own + (i % 2 == 0 && j % 2 == 0 ? slice + all : 0);
+  };
+  const ContactOperator W = shared_of(entry, of_all, 1);
+  CHECK(W.in_sequence().size() == ranks);
+  Vector b(2 * of_all, 0.), r;
+  for (std::size_t pair = 0; pair < of_all; ++pair)
+    b[2 * pair] = -1.5 + std::cos(static_cast<double>(pair * pair % 17));
   const ContactResult result = solve_contact(W, b, {0.3}, {}, r);
   CHECK(result.converged);
-  CHECK(result.iterations > 100); // patch by patch, in vain
-  CHECK(result.as_one);
-  CHECK(contact_residual(make_contact_operator(dense, pairs, 2), FrictionLaw{0.3}, b, r) < 1.01e-10);
+  CHECK(result.as_one == (ranks > 2)); // two slices that push each other always converge
+  CHECK(contact_residual(W, FrictionLaw{0.3}, b, r) < 1.01e-10);
   ContactSettings settings;
   settings.max_iterations = 3;
   CHECK(solve_contact(W, b, {0.3}, settings, r = {}).iterations == 3);
-}
-
-TEST_CASE("bodies that act on each other like one are one patch, and the answer is that of the fixed point")
-{
-  if (rank_of(PETSC_COMM_WORLD) != 0) return;
-  // each of four other bodies with 81 pairs: 4 * 81 * 0.01 = 3.2 beside 1 + 2 sum of exp(-1.2 k) = 1.9 of its own
-  const ContactOperator coupled = make_contact_operator(compliance_of_bodies(5, 0.01), pairs, 2);
-  CHECK(coupled.patches().size() == 1);
-  Vector swept, projected;
-  const Vector b = velocity();
-  CHECK(solve_contact(coupled, b, {0.4}, {}, swept).converged);
-  CHECK(solve_contact(coupled, b, {0.4}, {ContactSolver::fixed_point, 1e-12, 100000, 0}, projected).converged);
-  CHECK(difference(swept, projected) < 1e-7 * *std::max_element(projected.begin(), projected.end()));
 }

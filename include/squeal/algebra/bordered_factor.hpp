@@ -3,8 +3,8 @@
 ///     [A  B'] [x     ]   [b]
 ///     [B  0 ] [lambda] = [*]     leaves the Schur complement -B A^-1 B' of the border.
 /// B is never eliminated. A solve has two halves: `forward` turns b into B A^-1 b, and `backward` gives x = A^-1 (b -
-/// B' lambda) for the caller's lambda. Both together cost less than two solves with A alone. Several right-hand sides
-/// are solved at once.
+/// B' lambda) for the caller's lambda. Both together cost less than two solves with A alone, but for MUMPS's factor,
+/// which solves twice, and once for each column of the Schur complement. Several right-hand sides are solved at once.
 #include "squeal/base/petsc.hpp"
 #include "squeal/base/words.hpp"
 
@@ -12,7 +12,6 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -46,8 +45,6 @@ struct FactorOptions
   std::shared_ptr<KnownAnalyses> known{}; // one for all copies; null: every matrix is analysed anew
 };
 
-class CondensedProducts;
-
 /// Columns `first` to `last` of a symmetric matrix from row `first` on, one after the other, `height` numbers each.
 struct CondensedStrip
 {
@@ -73,12 +70,14 @@ public:
   /// Whether a pivot was zero or negative: A is not positive definite, and the factor is not to be used.
   bool failed() const;
 
-  /// scale B A^-1 B', row-major, symmetric to the last bit; on rank 0 only, empty elsewhere. MUMPS's factor
-  /// moves its storage out: call it once.
+  /// scale B A^-1 B', row-major, symmetric to the last bit; on rank 0 only, empty elsewhere.
   std::vector<double> condensed(double scale) const;
 
-  /// B A^-1 B' without storing it; nothing of MUMPS, which has stored it already.
-  std::optional<CondensedProducts> condensed_products() const;
+  /// Gives `take` the columns of B A^-1 B' strip after strip, on rank k those from firsts[k] to firsts[k + 1], which
+  /// all are the last one or multiples of 24. Without `firsts` all come on rank 0.
+  void read_condensed(const std::function<void(const CondensedStrip&)>& take,
+                      std::span<const std::size_t> firsts) const;
+  void read_condensed(const std::function<void(const CondensedStrip&)>& take) const;
 
   /// B A^-1 b for each b, one after the other; on rank 0 only. `backward` must follow before the next `forward`.
   std::vector<double> forward(std::span<const Vec> b) const;
@@ -91,38 +90,8 @@ public:
   double entries() const;
 
 private:
-  friend class CondensedProducts;
   struct Parts;
   std::unique_ptr<Parts> parts_;
-};
-
-/// The condensed operator B A^-1 B' = E E' of the rows E = B L^-T that a supernodal factor A = L L' holds
-/// (src/README.md, section 8.1). It belongs to the factor, wherever that is moved to, and ends with it. Its members are
-/// collective.
-class CondensedProducts
-{
-public:
-  /// Rows of B.
-  int size() const;
-
-  /// Numbers of E that a product reads, on all ranks.
-  double entries() const;
-
-  /// The product with x, which is read on rank 0; given there.
-  std::vector<double> product(std::span<const double> x) const;
-
-  /// Columns that strips do not part, but for the last ones: whole pairs of two or three rows, and whole tiles.
-  static constexpr std::size_t together = 24;
-
-  /// Gives `take` a strip after the other, of moderate size: on rank 0, or on the rank whose columns they are.
-  /// `shares`: the first column of each rank, a multiple of `together`, and the end.
-  void read(const std::function<void(const CondensedStrip&)>& take, std::span<const std::size_t> shares = {}) const;
-
-private:
-  friend class Factor;
-  explicit CondensedProducts(const Factor::Parts& parts) : parts_(&parts) {}
-
-  const Factor::Parts* parts_;
 };
 
 /// Memory and entries of a matrix's factors, by their symbolic analysis (src/README.md, section 8.9), of all ranks.
@@ -132,7 +101,6 @@ struct FactorForecast
   double bytes = 0;                        // of a Factor while it is made, without its Schur complement
   double symmetric = 0;                    // numbers in MUMPS's L D L' of A while it is made
   double entries = 0;                      // of L of A alone
-  double border_entries = 0;               // of E in a supernodal factor; 0: of another kind
   double operations = 0;                   // to make a Factor, on the rank that has most to do
 };
 

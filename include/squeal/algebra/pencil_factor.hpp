@@ -21,8 +21,9 @@ enum class Keep
 /// Options of all factors by MUMPS of the modes.
 struct PencilOptions
 {
-  PetscInt room = 30;       // [%] memory beyond MUMPS's estimate to start with; it grows where that is too little
-  double whole_limit = 0.2; // [GB] of a factor that every rank makes whole
+  PetscInt room = 30;            // [%] memory beyond MUMPS's estimate to start with; it grows where that is too little
+  double whole_limit = 0.2;      // [GB] of a factor that every rank makes whole
+  const char* prefix = "modes_"; // of MUMPS's own controls in the database
 };
 
 /// A nested dissection, on every rank. It serves every matrix of nearly the same pattern.
@@ -35,12 +36,12 @@ struct EliminationOrder
 /// By the lower triangle of K. Collective.
 EliminationOrder elimination_order(Mat K);
 
-/// The order of elimination is found once and serves every shift. Borrows K and M. Members are collective, but for
-/// negative_pivots.
+/// The order of elimination is found once and serves every shift. Members are collective, but for those that return a
+/// number.
 class PencilFactor
 {
 public:
-  /// `order`: one that is known; null: found here.
+  /// `M` may be null: K alone is factored. `order`: one that is known; null: found here.
   PencilFactor(Mat K, Mat M, Keep keep, const PencilOptions& options, const EliminationOrder* order = nullptr);
   ~PencilFactor();
 
@@ -52,6 +53,9 @@ public:
 
   /// (K - shift M)^-1 X; not of Keep::count.
   MultiVector solve(const MultiVector& X) const;
+
+  double entries() const;         // of the factor, on all ranks that share it
+  double foreseen_memory() const; // of these ranks [bytes]; no factor needs to be made
 
 private:
   struct Parts;

@@ -5,10 +5,9 @@
 /// of W itself in double precision.
 ///
 /// gauss_seidel: one exact local solve a pair and sweep. w follows each change of a reaction; pairs that no longer
-/// move are passed over. A large W is swept over through its near field, in single precision, patch by patch where
-/// several act little on each other: w of other patches follows when all have been swept. One product with W
-/// between sweeps and the verdict closes the residual. Where that does not help, the sweeps read W itself.
-/// Under-relaxed when 50 sweeps bring nothing.
+/// move are passed over. A large W is swept over through its near field, in single precision, by several ranks side by
+/// side: each then learns what the others changed. One product with W between sweeps and the verdict closes the
+/// residual. Where that does not help, the sweeps read W itself. Under-relaxed when 50 sweeps bring nothing.
 /// fixed_point: the paper's r_n <- max(0, r_n - rho w_n), r_t <- proj_disc(mu r_n)(r_t - rho w_t). It contracts without
 /// friction for 0 < rho < 2/lambda_max(W), at a rate set by cond(W).
 ///
@@ -44,7 +43,7 @@ struct ContactResult
   int iterations = 0; // sweeps
   double residual = 0;
   bool converged = false;
-  bool as_one = false; // all pairs were swept as one: patches, or pieces of one, did not converge by themselves
+  bool as_one = false; // ranks swept one after the other: side by side their sweeps did not converge
 };
 
 /// The last solutions of one trajectory, latest first, and W times them: a warm start then needs no product with W.
@@ -63,11 +62,11 @@ struct ContactProblem
 };
 
 /// Solves a problem from its `r`, which becomes the solution [N]. A problem that does not converge says so in its
-/// result. On rank 0, while the ranks that share W are within ServedProducts.
+/// result. On rank 0, or collective of the ranks that share W, with the same problem on each.
 ContactResult solve_contact(const ContactOperator& W, const PairFriction& friction, const ContactSettings& settings,
                             const ContactProblem& problem);
 
-/// The residual above of reactions r to the free velocities b. On the rank that has W.
+/// The residual above of reactions r to the free velocities b. On the ranks that have W.
 double contact_residual(const ContactOperator& W, const PairFriction& friction, const std::vector<double>& b,
                         const std::vector<double>& r);
 

@@ -29,7 +29,7 @@ struct ThetaStep
   double h = 0, theta = 0.5;              // [s], [-]
   std::optional<PairedMatrices> matrices; // M and K, unless they are dense
   Factor factor;                          // of A bordered by B
-  ContactOperator W;                      // on rank 0, which other ranks serve
+  ContactOperator W;                      // on rank 0, or shared by all
   ContactSettings contact;
   double factor_seconds = 0, condensed_seconds = 0; // to factor A with the corner that W is, to prepare W
 };
@@ -40,9 +40,6 @@ Owned<Mat> step_matrix(const Structure& structure, double h, double theta);
 /// Error: h not above 0, theta not in (0, 1].
 ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta,
                           const StepOptions& options);
-
-/// All entries of W, by rows, on rank 0; formed from the factor anew. Collective.
-std::vector<double> whole_operator(const ThetaStep& step, const Interface& interface);
 
 /// M v_k and K u_k of (v, u) into a pair of spans, each matrix read once.
 void multiply_mass_and_stiffness(const ThetaStep& step, const Structure& structure,
@@ -64,7 +61,7 @@ struct StepWork
   Owned<Vec> Mv, Av, Ku;                // of the state at hand
   Owned<Vec> Mv_next, Av_next, Ku_next; // of the one being computed
   Owned<Vec> v_next, v_theta, dv, f;    // f: h B'r
-  ContactMemory memory;                 // of the reactions, on rank 0
+  ContactMemory memory;                 // of the reactions, where W is
   double energy = 0;                    // [J]
   StepRecord* record = nullptr;         // of the next step, borrowed; null: none is wanted
   StickAnchors anchors{};

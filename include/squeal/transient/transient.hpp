@@ -48,7 +48,7 @@ struct MarchSummary
   long steps = 0; // fewer than asked when the energy stopped being finite, or the run is asked to end
   bool interrupted = false;
   long unconverged = 0;
-  long as_one = 0;              // steps whose patches did not converge by themselves
+  long as_one = 0;              // steps in which ranks had to sweep one after the other
   double first_unconverged = 0; // [s]
   double contact_residual_max = 0;
   double fall_of_friction_max = 0; // as of StepReport
@@ -86,7 +86,7 @@ struct Trajectory
   std::complex<double> predicted; // [1/s] discrete eigenvalue of the followed mode; NaN: none is followed
   double energy_defect_max = 0;   // of the energy, largest over the steps
   double seconds_per_step = 0, contact_iterations_mean = 0;
-  long contact_steps_as_one = 0;                    // whose patches did not converge by themselves
+  long contact_steps_as_one = 0;                    // in which ranks had to sweep one after the other
   double factor_seconds = 0, condensed_seconds = 0; // of its ThetaStep
   State end;
   History history;
