@@ -111,19 +111,50 @@ FoundValue find_value(Scene& scene, const std::string& key)
   return find_among(keys_of(scene), "", words_of_key(key));
 }
 
-std::vector<EntryKey> entries_of(Scene& scene, const std::string& table)
+namespace
 {
-  const SceneKeys keys = keys_of(scene);
-  const SceneKey& key = *std::ranges::find(keys, table, &SceneKey::name);
-  const auto& target = std::get<TableTarget>(key.target);
-  std::vector<EntryKey> entries;
-  for (std::size_t i = 0; i < target.size(); ++i)
+
+/// Appends the numbers among these keys.
+void append_numbers(const SceneKeys& keys, const std::string& path, Study use, std::vector<SceneNumber>& numbers)
+{
+  const auto add = [&](const std::string& key, double value)
   {
-    const auto [member, name, title, own] = target.entry(i);
-    const bool plain =
-        std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
-    const std::string word = name.empty() ? std::to_string(i) : plain ? name : toml_string(name);
-    entries.push_back({target.form == TableForm::list ? table + "." + word : table, title});
+    if (value != 0) numbers.push_back({key, value});
+  };
+  for (const SceneKey& key : keys)
+  {
+    if (is_absent(key)) continue;
+    const std::string own = path + "." + key.name;
+    WordsLeft none;
+    if (const auto* table = std::get_if<TableTarget>(&key.target))
+      append_numbers(table->entry(0).keys, own, use, numbers);
+    else if (key.study != use && key.study != Study::derive_and_double)
+      continue;
+    else if (const double* number = number_of(key.target))
+      add(own, *number);
+    else
+      for (std::size_t i = 0; const double value : numbers_of(key.target, none))
+        add(own + "." + std::to_string(i++), value);
+  }
+}
+
+} // namespace
+
+std::vector<EntryNumbers> entries_of(Scene& scene, Study use)
+{
+  std::vector<EntryNumbers> entries;
+  for (const SceneKey& key : keys_of(scene))
+  {
+    const auto* table = std::get_if<TableTarget>(&key.target);
+    for (std::size_t i = 0; table && i < table->size(); ++i)
+    {
+      const auto [member, name, title, own] = table->entry(i);
+      const bool plain =
+          std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
+      const std::string word = name.empty() ? std::to_string(i) : plain ? name : toml_string(name);
+      const std::string path = table->form == TableForm::list ? key.name + "." + word : key.name;
+      append_numbers(own, path, use, entries.emplace_back(EntryNumbers{key.name, path, title}).numbers);
+    }
   }
   return entries;
 }
@@ -185,7 +216,7 @@ Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers)
     std::string problem = problem_of_number(is_listed ? Rule::any : number.key.rule, value);
     *number.number = value;
     if (problem.empty() && is_listed) problem = problem_of_list(number.key.rule, number.entries);
-    if (!problem.empty()) refuse_value(number.key, place, text_of_number(value), problem);
+    if (!problem.empty()) refuse_value(number.key, place, text_of_number(value), problem, "");
     places.given[number.number] = given;
     if (key.starts_with("rotor.")) take_drives(changed);
   }

@@ -21,14 +21,17 @@ struct FoundValue
 /// Selects an entry of a list by its name, or else by its place.
 FoundValue find_value(Scene& scene, const std::string& key);
 
-/// An entry of a table with the key that leads to it.
-struct EntryKey
+/// An entry of a table, with those of its numbers that are not zero and that studies take.
+struct EntryNumbers
 {
-  std::string key; // "part.disc", "spring.0"; "friction" of a table that is no list
+  std::string table;
+  std::string key; // that leads to it: "part.disc", "spring.0"; "friction" of a table that is no list
   std::string title;
+  std::vector<SceneNumber> numbers{};
 };
 
-std::vector<EntryKey> entries_of(Scene& scene, const std::string& table);
+/// All entries of a scene, with the numbers that are of this use, or of both.
+std::vector<EntryNumbers> entries_of(Scene& scene, Study use);
 
 /// The value of a number that a table names, such as "[branch]". Throws Error if the key is not that of a number that
 /// the structure, its contact or its loads have.

@@ -10,6 +10,7 @@ namespace
 using enum Need;
 using enum Rule;
 using enum Effect;
+using Study::derive, Study::double_it, Study::derive_and_double;
 
 } // namespace
 
@@ -28,9 +29,9 @@ SceneKeys keys_of(Coupling& c)
       {"on", &c.on, "texts", "a named group, or a list of them, whose nodes it follows", required},
       {"at", &c.at, "m", "reference point", required, mesh},
       {"weights", &c.weights, "-", "of each node in the mean, one a group; 1 when absent", positive, mesh},
-      {"mass", &c.mass, "kg", "mass at the reference point", not_negative, mass},
-      {"inertia", &c.inertia, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about the reference point", mass,
-       Rule::inertia},
+      {"mass", &c.mass, "kg", "mass at the reference point", not_negative, mass, derive_and_double},
+      {"inertia", &c.inertia, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about the reference point", mass, Rule::inertia,
+       double_it},
   };
 }
 
@@ -48,10 +49,10 @@ SceneKeys keys_of(Connector& c)
        "motions that both share: all but rx are a hinge about axis_1, all but x a slot along it, all but x rx a "
        "cylinder"},
       {"stiffness", &c.stiffness, "N/m", "six of x y z rx ry rz, or the 36 of a symmetric matrix; rotations in N m",
-       stiffness_and_mass},
+       stiffness_and_mass, double_it},
       {"damping", &c.damping, "N s/m", "six or 36 constants, likewise; rotations in N m s", damping},
       {"loss_factor", &c.loss_factor, "-", "eta of its stiffness K (1 + i eta), as of a [[part]]", not_negative,
-       damping},
+       damping, derive},
   };
 }
 
@@ -61,9 +62,9 @@ SceneKeys keys_of(Beam& b)
       {"name", &b.name, "text", "name for bolts and messages", required},
       {"from", &b.from, "text", "point, rigid body or coupling at one end", required},
       {"to", &b.to, "text", "the same at the other end", required},
-      {"young", &b.young, "Pa", "Young's modulus", required, positive, stiffness_and_mass},
+      {"young", &b.young, "Pa", "Young's modulus", required, positive, stiffness_and_mass, derive_and_double},
       {"poisson", &b.poisson, "-", "Poisson's ratio", poisson, stiffness_and_mass},
-      {"density", &b.density, "kg/m3", "mass density; 0: no mass", not_negative, mass},
+      {"density", &b.density, "kg/m3", "mass density; 0: no mass", not_negative, mass, derive_and_double},
       {"diameter", &b.diameter, "m", "of a round section; when absent, the next three are needed", not_negative,
        stiffness_and_mass},
       {"area", &b.area, "m2", "area of the section", not_negative, stiffness_and_mass},
@@ -75,7 +76,7 @@ SceneKeys keys_of(Beam& b)
       {"axis_2", &b.axis_2, "-", "direction across the beam; any when absent", direction, stiffness_and_mass},
       {"elements", &b.elements, "-", "number of elements along it", positive},
       {"loss_factor", &b.loss_factor, "-", "eta of its stiffness K (1 + i eta), as of a [[part]]", not_negative,
-       damping},
+       damping, derive},
   };
 }
 
@@ -83,7 +84,7 @@ SceneKeys keys_of(AddedMass& m)
 {
   return {
       {"on", &m.on, "text", "named group, whose nodes share the mass equally", required},
-      {"mass", &m.mass, "kg", "the whole mass", required, not_negative, mass},
+      {"mass", &m.mass, "kg", "the whole mass", required, not_negative, mass, derive_and_double},
   };
 }
 
@@ -105,7 +106,7 @@ SceneKeys keys_of(Rotor& r)
       {"part", &r.part, "text", "part that moves past others, or a point", required},
       {"axis", &r.rotation.axis, "-", "axis of rotation: x, y, z or a vector; with rate", direction, drive},
       {"centre", &r.rotation.centre, "m", "a point of the axis; the origin when absent", drive},
-      {"rate", &r.rotation.rate, "rad/s", "angular velocity", drive},
+      {"rate", &r.rotation.rate, "rad/s", "angular velocity", drive, derive},
       {"velocity", &r.velocity, "m/s", "of its surface, instead of axis and rate: a belt", velocity, drive},
   };
 }

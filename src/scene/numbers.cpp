@@ -6,8 +6,8 @@
 #include "toml_values.hpp"
 
 #include <algorithm>
+#include <boost/algorithm/string.hpp>
 #include <fstream>
-#include <sstream>
 
 namespace squeal
 {
@@ -93,13 +93,8 @@ namespace
 std::vector<std::string> cells_of(const std::string& line)
 {
   std::vector<std::string> cells;
-  std::istringstream text(line);
-  for (std::string cell; std::getline(text, cell, ',');)
-  {
-    constexpr const char* around = " \t\r\"";
-    const std::size_t first = cell.find_first_not_of(around), last = cell.find_last_not_of(around);
-    cells.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
-  }
+  boost::split(cells, line, boost::is_any_of(","));
+  for (std::string& cell : cells) boost::trim_if(cell, boost::is_any_of(" \t\r\""));
   return cells;
 }
 
@@ -112,19 +107,12 @@ double number_in(const std::string& cell, const std::string& place, const std::s
   return value;
 }
 
-/// Design points: a value of each key a point.
-struct DesignTable
+/// Reads keys and design points from a CSV file: keys in the first line, then a line of values for each point. Empty
+/// lines and lines that begin with # are left out. Throws Error, with the line, for what is no number, for lines of
+/// another length and for a key that is there twice.
+void read_design_table(const std::filesystem::path& file, std::vector<std::string>& keys,
+                       std::vector<std::vector<double>>& points)
 {
-  std::vector<std::string> keys;
-  std::vector<std::vector<double>> points;
-};
-
-/// From a CSV file: keys in the first line, then a line of values for each point. Empty lines and lines that begin with
-/// # are left out. Throws Error, with the line, for what is no number, for lines of another length and for a key that
-/// is there twice.
-DesignTable read_design_table(const std::filesystem::path& file)
-{
-  DesignTable table;
   std::ifstream stream(file);
   int number = 0;
   for (std::string line; std::getline(stream, line);)
@@ -132,10 +120,10 @@ DesignTable read_design_table(const std::filesystem::path& file)
     const std::string place = file.string() + ", line " + std::to_string(++number);
     if (constexpr const char* mark = "\xEF\xBB\xBF"; number == 1 && line.starts_with(mark)) line.erase(0, 3); // UTF-8's
     const std::vector<std::string> cells = cells_of(line);
-    if (cells.empty() || cells == std::vector<std::string>{""} || cells.front().starts_with('#')) continue;
-    if (table.keys.empty())
+    if (cells == std::vector<std::string>{""} || cells.front().starts_with('#')) continue;
+    if (keys.empty())
     {
-      table.keys = cells;
+      keys = cells;
       if (cells.size() == 1 && cells[0].find(';') != std::string::npos)
         throw Error(place + ": '" + shortened(cells[0]) +
                     "' has semicolons: put commas between the keys, and points in numbers");
@@ -143,16 +131,15 @@ DesignTable read_design_table(const std::filesystem::path& file)
         if (std::ranges::count(cells, key) > 1) throw Error(place + ": the key '" + key + "' is there twice");
       continue;
     }
-    if (cells.size() != table.keys.size())
-      throw Error(place + ": " + std::to_string(cells.size()) + " values for " + std::to_string(table.keys.size()) +
+    if (cells.size() != keys.size())
+      throw Error(place + ": " + std::to_string(cells.size()) + " values for " + std::to_string(keys.size()) +
                   " keys: give one each, with a comma between them");
-    std::vector<double>& point = table.points.emplace_back();
-    for (std::size_t i = 0; i < cells.size(); ++i) point.push_back(number_in(cells[i], place, table.keys[i]));
+    std::vector<double>& point = points.emplace_back();
+    for (std::size_t i = 0; i < cells.size(); ++i) point.push_back(number_in(cells[i], place, keys[i]));
   }
-  if (table.points.empty())
+  if (points.empty())
     throw Error(file.string() + " holds no points: give a line of keys such as friction.coefficient,numbers.clamp, and "
                                 "a line of values for each point");
-  return table;
 }
 
 /// The checks of a sweep, each of which throws Error with the place of the wrong value.
@@ -192,10 +179,10 @@ private:
   {
     if (sweep_.from != sweep_.to || !sweep_.values.empty())
       fail(&sweep_.table, "table holds all values: take from, to and values out");
-    const DesignTable table = read_design_table(sweep_.table);
-    if (!sweep_.key.empty() && sweep_.key != table.keys) fail(&sweep_.key, "table holds the keys: take key out");
-    sweep_.key = table.keys;
-    sweep_.design = table.points;
+    std::vector<std::string> keys;
+    read_design_table(sweep_.table, keys, sweep_.design);
+    if (!sweep_.key.empty() && sweep_.key != keys) fail(&sweep_.key, "table holds the keys: take key out");
+    sweep_.key = keys;
     for (const std::string& key : sweep_.key)
       prefixed(sweep_.table.string() + ": ", [&] { (void)number_at(scene_, key, "[sweep] table:"); });
   }
@@ -253,66 +240,12 @@ void resolve_sweep(Scene& scene, const Places& places)
 namespace
 {
 
-/// Numbers of tables by their keys.
-struct TableNumbers
-{
-  std::string table;
-  std::vector<const char*> keys;
-};
-
-const std::vector<TableNumbers> derived_by = {
-    {"friction", {"coefficient"}},
-    {"damping", {"alpha", "beta"}},
-    {"part", {"young", "density", "loss_factor", "alpha", "beta", "rotation.rate"}},
-    {"point", {"mass"}},
-    {"rigid_body", {"mass"}},
-    {"coupling", {"mass"}},
-    {"spring", {"stiffness", "damping"}},
-    {"connector", {"loss_factor"}},
-    {"beam", {"young", "density", "loss_factor"}},
-    {"mass", {"mass"}},
-    {"rotor", {"rate"}},
-    {"contact", {"rotation.rate"}}};
-
-/// Numbers that the mass and the stiffness of a component are linear in.
-const std::vector<TableNumbers> linear_in = {
-    {"part",
-     {"density", "young", "orthotropic.young.0", "orthotropic.young.1", "orthotropic.young.2", "orthotropic.shear.0",
-      "orthotropic.shear.1", "orthotropic.shear.2"}},
-    {"point", {"mass"}},
-    {"rigid_body", {"mass", "inertia.0", "inertia.1", "inertia.2", "inertia.3", "inertia.4", "inertia.5"}},
-    {"coupling", {"mass", "inertia.0", "inertia.1", "inertia.2", "inertia.3", "inertia.4", "inertia.5"}},
-    {"spring", {"stiffness"}},
-    {"connector", {"stiffness"}},
-    {"beam", {"density", "young"}},
-    {"mass", {"mass"}}};
-
 /// Whether a contact has this number from a rotor.
 bool is_of_a_rotor(const Scene& scene, const std::string& key)
 {
   for (std::size_t i = 0; i < scene.contacts.size(); ++i)
     if (scene.contacts[i].driven_by >= 0 && key.starts_with(format("contact.%zu.rotation", i))) return true;
   return false;
-}
-
-/// An entry's numbers that are not zero; of a list all of them.
-std::vector<SceneNumber> numbers_in(Scene& scene, const EntryKey& entry, const std::vector<const char*>& keys)
-{
-  std::vector<SceneNumber> numbers;
-  const auto add = [&](const std::string& key)
-  {
-    const FoundValue found = find_value(scene, key);
-    if (found.number && *found.number != 0 && !is_of_a_rotor(scene, key)) numbers.push_back({key, *found.number});
-    return found.number != nullptr;
-  };
-  for (const char* own : keys)
-  {
-    const std::string key = entry.key + "." + own;
-    if (add(key)) continue;
-    int entry_of_list = 0;
-    while (add(key + "." + std::to_string(entry_of_list))) ++entry_of_list;
-  }
-  return numbers;
 }
 
 } // namespace
@@ -324,10 +257,10 @@ std::vector<SceneNumber> sensitive_numbers(const Scene& scene)
     numbers.push_back({key, number_at(scene, key, "[sensitivity]")});
   if (!numbers.empty()) return numbers;
   Scene copy = scene;
-  for (const auto& [table, keys] : derived_by)
-    if (!scene.matrices || table != "damping") // C is given
-      for (const EntryKey& entry : entries_of(copy, table))
-        std::ranges::copy(numbers_in(copy, entry, keys), std::back_inserter(numbers));
+  for (const EntryNumbers& entry : entries_of(copy, Study::derive))
+    if (!scene.matrices || entry.table != "damping") // C is given
+      std::ranges::copy_if(entry.numbers, std::back_inserter(numbers),
+                           [&](const SceneNumber& number) { return !is_of_a_rotor(scene, number.key); });
   return numbers;
 }
 
@@ -335,17 +268,16 @@ std::vector<SceneComponent> components_of(const Scene& scene)
 {
   std::vector<SceneComponent> components;
   Scene copy = scene;
-  for (const auto& [table, keys] : linear_in)
+  const std::vector<EntryNumbers> entries = entries_of(copy, Study::double_it);
+  for (const auto& [table, key, title, numbers] : entries)
   {
-    const std::vector<EntryKey> entries = entries_of(copy, table);
-    for (const EntryKey& entry : entries)
-    {
-      const bool unique = std::ranges::count(entries, entry.title, &EntryKey::title) == 1;
-      SceneComponent component{table, unique ? entry.title : entry.key + " (" + entry.title + ")",
-                               numbers_in(copy, entry, keys)};
-      for (SceneNumber& number : component.doubled) number.value *= 2;
-      if (!component.doubled.empty()) components.push_back(std::move(component));
-    }
+    if (numbers.empty()) continue;
+    const bool unique =
+        std::ranges::none_of(entries, [&](const EntryNumbers& other)
+                             { return other.table == table && other.title == title && other.key != key; });
+    SceneComponent& component =
+        components.emplace_back(SceneComponent{table, unique ? title : key + " (" + title + ")", numbers});
+    for (SceneNumber& number : component.doubled) number.value *= 2;
   }
   std::string rest;
   for (const Superelement& element : scene.superelements) rest += (rest.empty() ? "" : " and ") + element.name;
@@ -358,7 +290,8 @@ std::vector<std::string> contact_names(const Scene& scene)
 {
   Scene copy = scene;
   std::vector<std::string> names;
-  for (const EntryKey& contact : entries_of(copy, "contact")) names.push_back(contact.title);
+  for (const EntryNumbers& entry : entries_of(copy, Study::nothing))
+    if (entry.table == "contact") names.push_back(entry.title);
   return names;
 }
 

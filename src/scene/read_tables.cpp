@@ -1,4 +1,4 @@
-/// From the tables of a scene file to the values of their keys, with named numbers in place of their names.
+/// From the tables of a scene file to the values of their keys.
 #include "squeal/base/error.hpp"
 #include "toml_values.hpp"
 
@@ -9,70 +9,6 @@ namespace squeal
 
 namespace
 {
-
-/// Whether names of numbers may stand for values of a member.
-bool holds_numbers(const SceneKey& key)
-{
-  return key.rule != Rule::direction &&
-         std::visit(
-             [](const auto& target)
-             {
-               using Kind = std::remove_cvref_t<decltype(target)>;
-               return !std::is_same_v<Kind, bool*> && !std::is_same_v<Kind, std::string*> &&
-                      !std::is_same_v<Kind, std::filesystem::path*> && !std::is_same_v<Kind, Motions*> &&
-                      !std::is_same_v<Kind, std::vector<std::string>*> && !std::is_same_v<Kind, Choice> &&
-                      !std::is_same_v<Kind, StartTarget> && !std::is_same_v<Kind, TableTarget>;
-             },
-             key.target);
-}
-
-/// Puts named numbers into a value in place of their names, and records where they stand.
-class NumberNames
-{
-public:
-  explicit NumberNames(Scene& scene) : scene_(scene) {}
-
-  /// Whether any of them is in the list, which stands at the key.
-  bool put_into(toml::array& list, const std::string& key)
-  {
-    bool any = false;
-    for (std::size_t i = 0; i < list.size(); ++i)
-    {
-      const std::string place = key + "." + std::to_string(i);
-      toml::node& entry = *list.get(i);
-      if (toml::array* inner = entry.as_array()) any = put_into(*inner, place) || any;
-      if (toml::table* table = entry.as_table())
-        for (auto&& [name, value] : *table)
-          if (const auto number = use(value, place + "." + std::string(name.str())))
-          {
-            table->insert_or_assign(name, *number);
-            any = true;
-          }
-      if (const auto number = use(entry, place))
-      {
-        list.replace(list.cbegin() + static_cast<std::ptrdiff_t>(i), *number);
-        any = true;
-      }
-    }
-    return any;
-  }
-
-private:
-  /// The number that a text names, with a minus where the text begins with one; nothing: it names none.
-  std::optional<double> use(const toml::node& node, const std::string& key)
-  {
-    const auto text = node.value_exact<std::string>();
-    if (!text) return std::nullopt;
-    const bool negative = text->starts_with('-');
-    const auto named = scene_.numbers.find(text->substr(negative ? 1 : 0));
-    if (named == scene_.numbers.end()) return std::nullopt;
-    const double sign = negative ? -1 : 1;
-    scene_.number_uses.push_back({key, named->first, sign});
-    return sign * named->second;
-  }
-
-  Scene& scene_;
-};
 
 /// Reads the tables of one scene and records the places of its values.
 class Reader
@@ -103,43 +39,8 @@ private:
   void read_key(const SceneKey& key, const toml::node& node, const std::string& label, const std::string& path)
   {
     if (const auto* tables = std::get_if<TableTarget>(&key.target)) return read_tables(key, *tables, node, label, path);
-    toml::array copy; // of one entry, the value
-    node.visit([&](const auto& value) { copy.push_back(value); });
-    if (holds_numbers(key) && put_names(copy, path))
-      read_value({key, label, folder_, place_of(node)}, *copy.get(0));
-    else
-      read_own(key, node, label);
+    read_value({key, label, folder_, "", path, &scene_}, node);
     if (const void* const member = member_of(key.target)) places_.given[member] = place_of(node);
-  }
-
-  /// A value that names no number.
-  void read_own(const SceneKey& key, const toml::node& node, const std::string& label) const
-  {
-    try
-    {
-      read_value({key, label, folder_}, node);
-    }
-    catch (const Error& error)
-    {
-      auto text = node.value_exact<std::string>();
-      for (std::size_t i = 0; node.is_array() && !text && i < node.as_array()->size(); ++i)
-        text = node.as_array()->get(i)->value_exact<std::string>();
-      if (!text || !holds_numbers(key) || scene_.numbers.empty()) throw;
-      std::vector<std::string> names;
-      for (const auto& [name, value] : scene_.numbers) names.push_back(name);
-      throw Error(error.what() + std::string("; no number of [numbers] has that name") +
-                  hint_or_list(text->substr(text->starts_with('-') ? 1 : 0), names));
-    }
-  }
-
-  /// Puts named numbers into a list of one value.
-  bool put_names(toml::array& value, const std::string& path)
-  {
-    const std::size_t before = scene_.number_uses.size();
-    const bool any = NumberNames(scene_).put_into(value, path);
-    for (std::size_t i = before; i < scene_.number_uses.size(); ++i) // take the place in the list of one out
-      scene_.number_uses[i].key.erase(path.size(), 2);
-    return any;
   }
 
   void read_tables(const SceneKey& key, const TableTarget& tables, const toml::node& node, const std::string& label,

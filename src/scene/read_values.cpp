@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -48,13 +47,15 @@ Bounds bounds_of(Rule rule)
 class ValueReader
 {
 public:
-  explicit ValueReader(const ValuePlace& value) : value_(value) {}
+  explicit ValueReader(ValuePlace value) : value_(std::move(value)) {}
 
   void read(const toml::node& node, double& target) const { target = number(node); }
   void read(const toml::node& node, int& target) const { target = whole_number<int>(node); }
   void read(const toml::node& node, long& target) const { target = whole_number<long>(node); }
   void read(const toml::node& node, Vec3& target) const { target = vector(node); }
   void read(const toml::node& node, std::optional<Vec3>& target) const { target = vector(node); }
+  void read(const toml::node& node, const Choice& target) const { read_word(node, target, nullptr); }
+  void read(const toml::node& node, const StartTarget& target) const { read_word(node, target.kind, target.file); }
 
   void read(const toml::node& node, bool& target) const
   {
@@ -66,27 +67,6 @@ public:
   {
     target = text(node);
     if (value_.key.need == Need::required && target.empty()) fail(node, "a name that is not empty");
-  }
-
-  void read(const toml::node& node, const Choice& target) const
-  {
-    const std::vector<std::string> words(target.words.begin(), target.words.end());
-    const std::string given = text(node);
-    const auto place = place_of_word(given, words);
-    if (!place) throw refusal(node, given, words, hint_or_list(given, words));
-    target.set(target.member, *place);
-  }
-
-  void read(const toml::node& node, const StartTarget& target) const
-  {
-    const auto& kind = target.kind;
-    const std::vector<std::string> words(kind.words.begin(), kind.words.end() - 1);
-    const std::string given = text(node);
-    const auto place = place_of_word(given, words);
-    *target.file = place ? std::filesystem::path() : absolute(given);
-    kind.set(kind.member, place.value_or(words.size()));
-    if (!place && !is_file(*target.file))
-      throw refusal(node, given, words, ", and there is no file " + target.file->string());
   }
 
   void read(const toml::node& node, std::filesystem::path& target) const
@@ -108,30 +88,28 @@ public:
     const toml::array* array = node.as_array();
     if constexpr (std::is_same_v<Value, Vec3>) // which is a list itself
       if (array && !array->empty() && array->get(0)->is_number()) array = nullptr;
-    target.clear();
-    const auto add = [&](const toml::node& entry)
-    {
-      Value value{};
-      read(entry, value);
-      target.push_back(value);
-    };
-    if (!array)
-      add(node);
-    else
-      for (const toml::node& entry : *array) add(entry);
+    target.assign(array ? array->size() : 1, {});
+    if (!array) read(node, target[0]);
+    for (std::size_t i = 0; array && i < target.size(); ++i) part(i).read(*array->get(i), target[i]);
     if (target.empty()) fail(node, "at least one value");
   }
 
-  /// Rows of a time, or a speed, and a factor.
+  /// Rows of a time, or a speed, and a factor; the first number rises.
   void read(const toml::node& node, FactorTable& target) const
   {
+    constexpr const char* expected = "rows [time in s or speed in m/s, factor] such as [[0, 0], [0.1, 1]]";
+    const toml::array* rows = node.as_array();
+    if (!rows || rows->empty()) fail(node, expected);
     target = {};
-    for (const auto& [at, factor] :
-         rows_of_two(node, "rows [time in s or speed in m/s, factor] such as [[0, 0], [0.1, 1]]"))
+    for (std::size_t i = 0; i < rows->size(); ++i)
     {
-      if (value_.key.rule == Rule::not_negative && factor < 0) fail(node, "factors of zero or above");
-      target.at.push_back(at);
-      target.value.push_back(factor);
+      const toml::node& row = *rows->get(i);
+      const std::vector<double> values = part(i).numbers(row, expected);
+      if (values.size() != 2) fail(row, expected);
+      if (i > 0 && !(values[0] > target.at.back())) fail(row, "a first number above that of the row before");
+      if (value_.key.rule == Rule::not_negative && values[1] < 0) fail(node, "factors of zero or above");
+      target.at.push_back(values[0]);
+      target.value.push_back(values[1]);
     }
   }
 
@@ -165,11 +143,7 @@ public:
     const toml::table* table = node.as_table();
     if (!table) fail(node, "a table of numbers, such as { size = 4000 }");
     for (const auto& [key, value] : *table)
-    {
-      if (!value.is_number()) fail(value, "finite numbers in the table");
-      need_computable(value, *value.value<double>(), "finite numbers in the table");
-      target[std::string(key.str())] = *value.value<double>();
-    }
+      target[std::string(key.str())] = part(key.str()).finite(value, "finite numbers in the table");
   }
 
   template <class Part, class Member> void read(const toml::node& node, const MemberTarget<Part, Member>& target) const
@@ -186,33 +160,87 @@ private:
   }
 
   /// Throws Error for a value of the key that is not as expected.
-  [[noreturn]] void fail(const toml::node& node, const std::string& expected) const
+  [[noreturn]] void fail(const toml::node& node, const std::string& expected, const std::string& hint) const
   {
-    refuse_value(value_.key, place(node), text_of(node), expected);
+    refuse_value(value_.key, place(node), text_of(node), expected, hint);
+  }
+  [[noreturn]] void fail(const toml::node& node, const std::string& expected) const { fail(node, expected, ""); }
+
+  /// Reads a part of the value, by the word that selects it in overrides.
+  ValueReader part(std::string_view word) const
+  {
+    ValuePlace place = value_;
+    place.path.append(".").append(word);
+    return ValueReader(place);
+  }
+  ValueReader part(std::size_t number) const { return part(std::to_string(number)); }
+
+  /// A word of the choice. `file`: of the last one, which stands for any other text; null: it does not.
+  void read_word(const toml::node& node, const Choice& choice, std::filesystem::path* file) const
+  {
+    const std::vector<std::string> words(choice.words.begin(), choice.words.end() - (file ? 1 : 0));
+    const std::string given = text(node);
+    const auto word = static_cast<std::size_t>(std::ranges::find(words, given) - words.begin());
+    const bool is_known = word < words.size();
+    if (file) *file = is_known ? std::filesystem::path() : absolute(given);
+    if (!is_known && !(file && is_file(*file)))
+      throw Error(place(node) + value_.key.name + " = '" + given + "' is none of " + joined(words) +
+                  (file ? ", and there is no file " + file->string() : hint_or_list(given, words)));
+    choice.set(choice.member, word);
   }
 
-  /// Throws Error for what is not finite, and where the third power would not be.
-  void need_computable(const toml::node& node, double value, const std::string& expected) const
+  /// Whether names of numbers may stand for this value.
+  bool takes_names() const { return value_.scene && value_.key.rule != Rule::direction; }
+
+  /// The number that a text names, with a minus where the text begins with one; nothing: it names none. Records where
+  /// it stands.
+  std::optional<double> named_number(const toml::node& node) const
   {
+    const auto text = node.value_exact<std::string>();
+    if (!text || !takes_names()) return std::nullopt;
+    const double sign = text->starts_with('-') ? -1 : 1;
+    const auto named = value_.scene->numbers.find(text->substr(sign < 0 ? 1 : 0));
+    if (named == value_.scene->numbers.end()) return std::nullopt;
+    value_.scene->number_uses.push_back({value_.path, named->first, sign});
+    return sign * named->second;
+  }
+
+  /// What a message says besides about a text that names no number.
+  std::string hint_of_number(const toml::node& node) const
+  {
+    const auto text = node.value_exact<std::string>();
+    if (!text || !takes_names() || value_.scene->numbers.empty()) return "";
+    std::vector<std::string> names;
+    for (const auto& [name, number] : value_.scene->numbers) names.push_back(name);
+    return "; no number of [numbers] has that name" + hint_or_list(text->substr(text->starts_with('-') ? 1 : 0), names);
+  }
+
+  /// A finite number, of which the third power is finite as well.
+  double finite(const toml::node& node, const std::string& expected) const
+  {
+    const std::optional<double> named = named_number(node);
+    if (!named && !node.is_number()) fail(node, expected, hint_of_number(node));
+    const double value = named ? *named : *node.value<double>();
     if (!std::isfinite(value)) fail(node, expected);
     if (const std::string problem = problem_of_number(Rule::any, value); !problem.empty()) fail(node, problem);
+    return value;
   }
 
   double number(const toml::node& node) const
   {
-    if (!node.is_number()) fail(node, std::string(bounds_of(value_.key.rule).text) + ", not " + kind_of(node));
-    const double value = *node.value<double>();
+    const std::string expected = bounds_of(value_.key.rule).text;
+    const double value = finite(node, expected + (node.is_number() ? "" : ", not " + kind_of(node)));
     if (const std::string problem = problem_of_number(value_.key.rule, value); !problem.empty()) fail(node, problem);
     return value;
   }
 
   template <class Integer> Integer whole_number(const toml::node& node) const
   {
-    number(node);
-    const auto value = node.value<std::int64_t>();
-    if (!value || *value > std::numeric_limits<Integer>::max() || *value < std::numeric_limits<Integer>::min())
-      fail(node, "a whole number of at most " + std::to_string(std::numeric_limits<Integer>::max()));
-    return static_cast<Integer>(*value);
+    const double value = number(node);
+    constexpr Integer largest = std::numeric_limits<Integer>::max();
+    if (value != std::floor(value) || std::abs(value) >= static_cast<double>(largest))
+      fail(node, "a whole number of at most " + std::to_string(largest));
+    return static_cast<Integer>(value);
   }
 
   std::string text(const toml::node& node) const
@@ -229,30 +257,9 @@ private:
     const toml::array* array = node.as_array();
     if (!array) fail(node, expected + ", not " + kind_of(node));
     std::vector<double> values;
-    for (const toml::node& entry : *array)
-    {
-      if (!entry.is_number()) fail(entry, "finite numbers in the list");
-      need_computable(entry, *entry.value<double>(), "finite numbers in the list");
-      values.push_back(*entry.value<double>());
-    }
+    for (std::size_t i = 0; i < array->size(); ++i)
+      values.push_back(part(i).finite(*array->get(i), "finite numbers in the list"));
     return values;
-  }
-
-  /// Rows of two numbers, of which the first rises.
-  std::vector<std::pair<double, double>> rows_of_two(const toml::node& node, const std::string& expected) const
-  {
-    const toml::array* rows = node.as_array();
-    if (!rows || rows->empty()) fail(node, expected);
-    std::vector<std::pair<double, double>> result;
-    for (const toml::node& row : *rows)
-    {
-      const std::vector<double> values = numbers(row, expected);
-      if (values.size() != 2) fail(row, expected);
-      if (!result.empty() && !(values[0] > result.back().first))
-        fail(row, "a first number above that of the row before");
-      result.emplace_back(values[0], values[1]);
-    }
-    return result;
   }
 
   /// Returns a list of three numbers, or of a direction its unit vector, which may be given as "x", "-y" and so on.
@@ -286,21 +293,7 @@ private:
     return text.empty() ? std::filesystem::path() : (value_.folder / text).lexically_normal();
   }
 
-  static std::optional<std::size_t> place_of_word(const std::string& word, const std::vector<std::string>& words)
-  {
-    const auto found = std::ranges::find(words, word);
-    if (found == words.end()) return std::nullopt;
-    return static_cast<std::size_t>(found - words.begin());
-  }
-
-  /// `more`: after the words that are allowed.
-  Error refusal(const toml::node& node, const std::string& given, const std::vector<std::string>& words,
-                const std::string& more) const
-  {
-    return Error(place(node) + value_.key.name + " = '" + given + "' is none of " + joined(words) + more);
-  }
-
-  const ValuePlace& value_;
+  const ValuePlace value_;
 };
 
 } // namespace
@@ -323,28 +316,18 @@ void read_value(const ValuePlace& value, const toml::node& node)
 void set_by_word(const std::string& place, const SceneKey& key, const std::string& word)
 {
   if (auto* const* list = std::get_if<std::vector<std::string>*>(&key.target)) return (*list)->push_back(word);
-  const char *const begin = word.data() + (word.starts_with('+') ? 1 : 0), *const end = word.data() + word.size();
-  const auto is_read = [&](auto& number)
-  {
-    const auto [stop, error] = std::from_chars(begin, end, number);
-    return error == std::errc() && stop == end;
-  };
-  const std::string no_label;
-  const std::filesystem::path no_folder;
-  const auto read = [&](const auto& value) { read_value({key, no_label, no_folder, place}, toml::value(value)); };
-  std::int64_t whole = 0;
-  double number = 0;
   const bool is_switch = std::holds_alternative<bool*>(key.target),
              takes_number = std::holds_alternative<double*>(key.target) || std::holds_alternative<int*>(key.target) ||
                             std::holds_alternative<long*>(key.target);
-  if (is_switch && (word.empty() || word == "true" || word == "false"))
-    read(word != "false");
-  else if (takes_number && is_read(whole))
-    read(whole);
-  else if (takes_number && is_read(number))
-    read(number);
-  else
-    read(word);
+  toml::table given{{"value", word}};
+  if (is_switch || takes_number) try
+    {
+      given = toml::parse("value = " + (is_switch && word.empty() ? "true" : word));
+    }
+    catch (const toml::parse_error&) // the text is no such value, which is refused
+    {
+    }
+  read_value({key, "", {}, place}, *given.get("value"));
 }
 
 std::string problem_of_number(Rule rule, double value)
@@ -368,10 +351,11 @@ std::string problem_of_list(Rule rule, std::span<double> entries)
   return {};
 }
 
-void refuse_value(const SceneKey& key, const std::string& place, const std::string& text, const std::string& expected)
+void refuse_value(const SceneKey& key, const std::string& place, const std::string& text, const std::string& expected,
+                  const std::string& hint)
 {
   throw Error(place + key.name + " = " + text + ": expected " + expected +
-              (has_unit(key.unit) ? " [" + key.unit + "]" : ""));
+              (has_unit(key.unit) ? " [" + key.unit + "]" : "") + hint);
 }
 
 } // namespace squeal

@@ -14,6 +14,7 @@ namespace
 using enum Need;
 using enum Rule;
 using enum Effect;
+using Study::derive, Study::double_it, Study::derive_and_double;
 
 template <class Entry> std::string title_of(const Entry& entry)
 {
@@ -93,10 +94,10 @@ SceneKeys keys_of(MeshSource& m)
 SceneKeys keys_of(Orthotropy& o)
 {
   return {
-      {"young", &o.young, "Pa", "E1, E2, E3 along the axes", required},
+      {"young", &o.young, "Pa", "E1, E2, E3 along the axes", required, double_it},
       {"poisson", &o.poisson, "-",
        "nu12, nu13, nu23; nu12 is the contraction along 2 over the extension along 1 under tension along 1", required},
-      {"shear", &o.shear, "Pa", "G12, G13, G23", required},
+      {"shear", &o.shear, "Pa", "G12, G13, G23", required, double_it},
       {"axis_1", &o.axis_1, "-", "direction of the first axis: x, y, z or a vector", direction},
       {"axis_2", &o.axis_2, "-", "direction of the second one, square to it; the third is square to both", direction},
       {"cylinder", braces(o.cylinder), "table",
@@ -109,7 +110,7 @@ SceneKeys keys_of(Rotation& r)
   return {
       {"axis", &r.axis, "-", "axis of rotation: x, y, z or a vector", required, direction},
       {"centre", &r.centre, "m", "a point of the axis; the origin when absent"},
-      {"rate", &r.rate, "rad/s", "angular velocity", required},
+      {"rate", &r.rate, "rad/s", "angular velocity", required, derive},
   };
 }
 
@@ -118,25 +119,25 @@ SceneKeys keys_of(Part& p)
   return {
       {"name", &p.name, "text", "named group of the mesh", required},
       {"young", &p.material.young, "Pa", "Young's modulus; required unless orthotropic is given", not_negative,
-       stiffness_and_mass},
+       stiffness_and_mass, derive_and_double},
       {"poisson", &p.material.poisson, "-", "Poisson's ratio; required unless orthotropic is given", poisson,
        stiffness_and_mass},
       {"orthotropic", braces(p.material.orthotropy), "table",
        "of a solid, nine constants and their axes instead: {young, poisson, shear, axis_1, axis_2}",
        stiffness_and_mass},
-      {"density", &p.material.density, "kg/m3", "mass density", required, positive, mass},
+      {"density", &p.material.density, "kg/m3", "mass density", required, positive, mass, derive_and_double},
       {"thickness", &p.thickness, "m", "thickness of a shell; 0 is a solid", not_negative, stiffness_and_mass},
       {"loss_factor", &p.loss_factor, "-",
        "eta of the stiffness K (1 + i eta), at most 10, with damping.loss_frequency; it adds to Rayleigh damping",
-       not_negative, damping},
+       not_negative, damping, derive},
       {"rotation", braces(p.rotation), "table",
        "spin of a solid of revolution, alike in all directions, about its own axis, seen from the frame at rest: "
        "{axis, centre, rate}; gyroscopic and centrifugal terms",
        stiffness_and_mass},
       {"alpha", DampingTarget{&p.damping, &RayleighDamping::alpha}, "1/s",
-       "the part's own Rayleigh damping, mass part; [damping] when both are absent", not_negative, damping},
+       "the part's own Rayleigh damping, mass part; [damping] when both are absent", not_negative, damping, derive},
       {"beta", DampingTarget{&p.damping, &RayleighDamping::beta}, "s",
-       "the part's own Rayleigh damping, stiffness part", not_negative, damping},
+       "the part's own Rayleigh damping, stiffness part", not_negative, damping, derive},
   };
 }
 
@@ -145,7 +146,7 @@ SceneKeys keys_of(Point& p)
   return {
       {"name", &p.name, "text", "name for springs, forces, contacts and probes", required},
       {"at", &p.at, "m", "position", required, mesh},
-      {"mass", &p.mass, "kg", "point mass", not_negative, mass},
+      {"mass", &p.mass, "kg", "point mass", not_negative, mass, derive_and_double},
       {"free", &p.free, "motions", "motions that are free: any of x y z rx ry rz, or all, none", required},
   };
 }
@@ -156,9 +157,9 @@ SceneKeys keys_of(RigidBody& b)
       {"name", &b.name, "text", "name for springs, forces and probes", required},
       {"surfaces", &b.surfaces, "texts", "a named surface, or a list of them", required},
       {"at", &b.at, "m", "reference point", required, mesh},
-      {"mass", &b.mass, "kg", "mass at the reference point", not_negative, mass},
-      {"inertia", &b.inertia, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about the reference point", mass,
-       Rule::inertia},
+      {"mass", &b.mass, "kg", "mass at the reference point", not_negative, mass, derive_and_double},
+      {"inertia", &b.inertia, "kg m2", "xx yy zz, or xx yy zz xy yz zx, about the reference point", mass, Rule::inertia,
+       double_it},
       {"free", &b.free, "motions", "motions that are free: any of x y z rx ry rz, or all, none", required},
       {"motions", &b.motions, "motions", "motions of the surfaces' nodes that follow it; the others are their own"},
   };
@@ -170,8 +171,9 @@ SceneKeys keys_of(Spring& s)
       {"from", &s.from, "text", "point, rigid body, coupling, or named group, whose nodes share the spring", required},
       {"to", &s.to, "text", "the same, or ground; one end at most is a group"},
       {"direction", &s.direction, "-", "line of action: x, y, z or a vector", required, direction, stiffness_and_mass},
-      {"stiffness", &s.stiffness, "N/m", "stiffness of the spring", not_negative, stiffness_and_mass},
-      {"damping", &s.damping, "N s/m", "constant of the dashpot", not_negative, damping},
+      {"stiffness", &s.stiffness, "N/m", "stiffness of the spring", not_negative, stiffness_and_mass,
+       derive_and_double},
+      {"damping", &s.damping, "N s/m", "constant of the dashpot", not_negative, damping, derive},
   };
 }
 
@@ -300,7 +302,7 @@ SceneKeys keys_of(FrictionLaw& f)
 {
   return {
       {"coefficient", &f.coefficient, "-", "Coulomb's mu; with a decay_speed its value at high speed", not_negative,
-       friction},
+       friction, derive},
       {"static_coefficient", &f.static_coefficient, "-",
        "mu at rest; it goes with decay_speed, without which mu is constant", not_negative, friction},
       {"decay_speed", &f.decay_speed, "m/s",
@@ -323,8 +325,8 @@ SceneKeys keys_of(FrictionLaw& f)
 SceneKeys keys_of(RayleighDamping& d)
 {
   return {
-      {"alpha", &d.alpha, "1/s", "mass part", not_negative, damping},
-      {"beta", &d.beta, "s", "stiffness part", not_negative, damping},
+      {"alpha", &d.alpha, "1/s", "mass part", not_negative, damping, derive},
+      {"beta", &d.beta, "s", "stiffness part", not_negative, damping, derive},
       {"loss_frequency", &d.loss_frequency, "Hz",
        "where loss factors have their viscous equivalent eta/omega K in time steps and in the estimate; modes take "
        "complex stiffness",

@@ -40,17 +40,20 @@ std::string problem_of_number(Rule rule, double value);
 /// The entries that a key wants instead of these; empty: it allows them. A direction becomes a unit vector.
 std::string problem_of_list(Rule rule, std::span<double> entries);
 
-/// Throws Error for a value of a key that is not as expected. `place`: of the value, with the label of the table.
+/// Throws Error for a value of a key that is not as expected. `place`: of the value, with the label of the table;
+/// `hint`: said last.
 [[noreturn]] void refuse_value(const SceneKey& key, const std::string& place, const std::string& text,
-                               const std::string& expected);
+                               const std::string& expected, const std::string& hint);
 
 /// The key of a value and what messages and paths need besides.
 struct ValuePlace
 {
   const SceneKey& key;
-  const std::string& label;            // of the key's table
-  const std::filesystem::path& folder; // that paths are relative to
-  std::string place = {};              // empty: that of the node
+  std::string label;            // of the key's table
+  std::filesystem::path folder; // that paths are relative to
+  std::string place{};          // empty: that of the node
+  std::string path{};           // of the value, as overrides name it
+  Scene* scene = nullptr;       // whose named numbers may stand for it, and where these are recorded; null: none may
 };
 
 /// Sets the member of a key that is no table. Throws Error for a value that is not of the key's kind, or outside its

@@ -75,11 +75,20 @@ enum class Rule
   below_two, // in [0, 2)
 };
 
+/// What studies do with a number unless the scene says which numbers they take.
+enum class Study
+{
+  nothing,
+  derive,            // eigenvalues, by it
+  double_it,         // to see what its component holds: mass and stiffness are linear in it
+  derive_and_double, // both
+};
+
 struct SceneKey
 {
   SceneKey() = default;
 
-  /// `properties`: Need, Rule and Effect where they are not the first ones.
+  /// `properties`: Need, Rule, Effect and Study where they are not the first ones.
   template <class... Properties>
   SceneKey(const char* name_, Target target_, const char* unit_, const char* meaning_, Properties... properties)
       : name(name_), target(std::move(target_)), unit(unit_), meaning(meaning_)
@@ -94,11 +103,13 @@ struct SceneKey
   Need need{};
   Rule rule{};
   Effect effect{}; // of a number
+  Study study{};   // of a number
 
 private:
   void take(Need property) { need = property; }
   void take(Rule property) { rule = property; }
   void take(Effect property) { effect = property; }
+  void take(Study property) { study = property; }
 };
 
 using SceneKeys = std::vector<SceneKey>;
