@@ -41,13 +41,6 @@ MultiVector parts_of(const Eigenpair& pair)
   return columns_of(std::array{pair.real.get(), pair.imaginary.get()});
 }
 
-/// x'y without conjugation, of real and imaginary parts.
-Complex bilinear(const MultiVector& x, const MultiVector& y)
-{
-  const Eigen::MatrixXd products = inner_products(x, y);
-  return {products(0, 0) - products(1, 1), products(0, 1) + products(1, 0)};
-}
-
 /// By the two-sided Rayleigh quotient.
 Complex change_of_lambda(const TwoSidedProblem& problem, const TwoSidedMode& mode)
 {
@@ -61,6 +54,12 @@ Complex change_of_lambda(const TwoSidedProblem& problem, const TwoSidedMode& mod
 }
 
 } // namespace
+
+Complex bilinear(const MultiVector& x, const MultiVector& y)
+{
+  const Eigen::MatrixXd products = inner_products(x, y);
+  return {products(0, 0) - products(1, 1), products(0, 1) + products(1, 0)};
+}
 
 TwoSidedProblem make_two_sided(const QuadraticProblem& matrices, Mat K_loss, Mat K_z, Mat M_z,
                                const PencilOptions& options)

@@ -33,6 +33,9 @@ struct TwoSidedMode
   double backward_error = 0; // the larger one of both vectors; infinite: not found
 };
 
+/// x'y without conjugation, of vectors by their real and imaginary parts. Collective.
+std::complex<double> bilinear(const MultiVector& x, const MultiVector& y);
+
 /// The mode near a lambda with a right vector. Collective. Error: memory runs out.
 TwoSidedMode find_two_sided(TwoSidedProblem& problem, std::complex<double> lambda, const MultiVector& right);
 
