@@ -7,6 +7,7 @@
 #include <cmath>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <map>
 
 namespace squeal
 {
@@ -59,101 +60,45 @@ double subspace_mac(const ModeForms& forms, const Places& from, const Places& to
   return least;
 }
 
-/// Modes that change places among themselves: unmatched ones that share more than a trace.
+/// Modes that change places among themselves.
 struct Cluster
 {
   Places from, to;
 };
 
-/// The entries of both lists that are linked with an entry, by a search through the links.
-Cluster linked(const MatrixXd& macs, Index start, const Places& open_from, const Places& open_to)
+/// The parts of the graph in which modes of both points are linked that share more than a trace, of those that are
+/// free.
+std::map<Index, Cluster> clusters_of(const MatrixXd& macs, const std::vector<char>& free_from,
+                                     const std::vector<char>& free_to)
 {
   constexpr double trace = 0.02;
-  Cluster cluster{{start}, {}};
-  const auto holds = [](const Places& places, Index k)
-  { return std::find(places.begin(), places.end(), k) != places.end(); };
-  for (bool grown = true; grown;)
+  const auto free_places = [](const std::vector<char>& free)
   {
-    grown = false;
-    for (const Index i : open_from)
-      for (const Index j : open_to)
+    Places places;
+    for (std::size_t k = 0; k < free.size(); ++k)
+      if (free[k]) places.push_back(static_cast<Index>(k));
+    return places;
+  };
+  const Places from = free_places(free_from), to = free_places(free_to);
+  std::map<Index, Index> part_from, part_to; // by the first member of the first point
+  for (const Index i : from) part_from[i] = i;
+  for (const Index j : to) part_to[j] = macs.rows();
+  for (bool changed = true; changed;)
+  {
+    changed = false;
+    for (const Index i : from)
+      for (const Index j : to)
       {
-        const bool has_i = holds(cluster.from, i), has_j = holds(cluster.to, j);
-        if (macs(i, j) < trace || has_i == has_j) continue;
-        if (has_i)
-          cluster.to.push_back(j);
-        else
-          cluster.from.push_back(i);
-        grown = true;
+        Index &one = part_from[i], &other = part_to[j];
+        if (macs(i, j) < trace || one == other) continue;
+        one = other = std::min(one, other);
+        changed = true;
       }
   }
-  return cluster;
-}
-
-/// Matches the members of a cluster, the largest MACs first.
-void match_within(const Cluster& cluster, const MatrixXd& macs, double mac, std::vector<Match>& matches)
-{
-  Places from = cluster.from, to = cluster.to;
-  while (!from.empty())
-  {
-    Index best_i = 0, best_j = 0;
-    for (Index i = 0; i < static_cast<Index>(from.size()); ++i)
-      for (Index j = 0; j < static_cast<Index>(to.size()); ++j)
-        if (macs(from[static_cast<std::size_t>(i)], to[static_cast<std::size_t>(j)]) >
-            macs(from[static_cast<std::size_t>(best_i)], to[static_cast<std::size_t>(best_j)]))
-        {
-          best_i = i;
-          best_j = j;
-        }
-    matches[static_cast<std::size_t>(from[static_cast<std::size_t>(best_i)])] = {
-        static_cast<int>(to[static_cast<std::size_t>(best_j)]), mac, static_cast<int>(cluster.from.size())};
-    from.erase(from.begin() + best_i);
-    to.erase(to.begin() + best_j);
-  }
-}
-
-/// The places of `count` that nothing in `taken` holds.
-Places places_left(Index count, const std::vector<char>& taken)
-{
-  Places places;
-  for (Index k = 0; k < count; ++k)
-    if (!taken[static_cast<std::size_t>(k)]) places.push_back(k);
-  return places;
-}
-
-/// Modes that are each other's best, with a clear MAC.
-void match_single(const MatrixXd& macs, double clear, std::vector<Match>& matches, std::vector<char>& taken)
-{
-  for (Index i = 0; i < macs.rows(); ++i)
-  {
-    Index j = 0, back = 0;
-    if (macs.row(i).maxCoeff(&j) < clear) continue;
-    macs.col(j).maxCoeff(&back);
-    if (back != i) continue;
-    matches[static_cast<std::size_t>(i)] = {static_cast<int>(j), macs(i, j), 1};
-    taken[static_cast<std::size_t>(j)] = 1;
-  }
-}
-
-/// Adds to a cluster the matched mode that shares most with it.
-void add_neighbour(Cluster& cluster, const MatrixXd& macs, const std::vector<Match>& matches)
-{
-  double most = 0;
-  Index chosen = -1;
-  for (Index i = 0; i < macs.rows(); ++i)
-  {
-    const int to = matches[static_cast<std::size_t>(i)].to;
-    if (to < 0 || std::find(cluster.from.begin(), cluster.from.end(), i) != cluster.from.end()) continue;
-    double shared = 0;
-    for (const Index j : cluster.to) shared = std::max(shared, macs(i, j));
-    for (const Index k : cluster.from) shared = std::max(shared, macs(k, to));
-    if (shared <= most) continue;
-    most = shared;
-    chosen = i;
-  }
-  if (chosen < 0) return;
-  cluster.from.push_back(chosen);
-  cluster.to.push_back(matches[static_cast<std::size_t>(chosen)].to);
+  std::map<Index, Cluster> clusters;
+  for (const auto& [i, part] : part_from) clusters[part].from.push_back(i);
+  for (const auto& [j, part] : part_to) clusters[part].to.push_back(j);
+  return clusters;
 }
 
 } // namespace
@@ -185,26 +130,29 @@ std::vector<Match> follow(const ModeForms& forms, double clear)
   std::vector<Match> matches(count);
   if (count == 0 || next == 0) return matches;
   const MatrixXd macs = all_macs(forms);
-  std::vector<char> taken(next, 0);
-  match_single(macs, clear, matches, taken);
-  std::vector<char> seen(matches.size());
-  for (std::size_t i = 0; i < matches.size(); ++i) seen[i] = matches[i].to >= 0;
-  for (std::size_t i = 0; i < matches.size(); ++i)
+  std::vector<char> free_from(count, 1), free_to(next, 1);
+  const auto match = [&](Index from, Index to, double mac, std::size_t subspace)
   {
-    if (seen[i]) continue;
-    Cluster cluster =
-        linked(macs, static_cast<Index>(i), places_left(macs.rows(), seen), places_left(macs.cols(), taken));
-    for (const Index k : cluster.from) seen[static_cast<std::size_t>(k)] = 1;
-    if (cluster.from.size() != cluster.to.size()) continue;
-    double mac = subspace_mac(forms, cluster.from, cluster.to);
-    if (mac < clear)
-    {
-      add_neighbour(cluster, macs, matches);
-      mac = subspace_mac(forms, cluster.from, cluster.to);
-    }
+    matches[static_cast<std::size_t>(from)] = {static_cast<int>(to), mac, static_cast<int>(subspace)};
+    free_from[static_cast<std::size_t>(from)] = free_to[static_cast<std::size_t>(to)] = 0;
+  };
+  for (Index i = 0, j = 0, back = 0; i < macs.rows(); ++i) // each other's best
+    if (macs.row(i).maxCoeff(&j) >= clear && (macs.col(j).maxCoeff(&back), back == i)) match(i, j, macs(i, j), 1);
+  for (const auto& [part, cluster] : clusters_of(macs, free_from, free_to))
+  {
+    const auto& [from, to] = cluster;
+    if (from.size() != to.size()) continue;
+    const double mac = subspace_mac(forms, from, to);
     if (mac < clear) continue;
-    match_within(cluster, macs, mac, matches);
-    for (const Index k : cluster.to) taken[static_cast<std::size_t>(k)] = 1;
+    MatrixXd shared = macs(from, to);
+    for (std::size_t k = 0; k < from.size(); ++k)
+    {
+      Index i = 0, j = 0;
+      shared.maxCoeff(&i, &j);
+      match(from[static_cast<std::size_t>(i)], to[static_cast<std::size_t>(j)], mac, from.size());
+      shared.row(i).setConstant(-1);
+      shared.col(j).setConstant(-1);
+    }
   }
   return matches;
 }
@@ -249,19 +197,6 @@ std::vector<int> names_by_shapes(const PointModes& reference, const PointModes& 
     }
   }
   return names;
-}
-
-std::vector<int> nearest_partners(const std::vector<Complex>& from, const std::vector<Complex>& to)
-{
-  const bool all = from.size() <= to.size(); // the shorter list has partners
-  const std::vector<std::size_t> places = all ? nearest_places(from, to) : nearest_places(to, from);
-  std::vector<int> partners(from.size(), -1);
-  for (std::size_t k = 0; k < places.size(); ++k)
-    if (all)
-      partners[k] = static_cast<int>(places[k]);
-    else
-      partners[places[k]] = static_cast<int>(k);
-  return partners;
 }
 
 } // namespace squeal

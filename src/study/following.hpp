@@ -46,11 +46,6 @@ Eigen::MatrixXd all_macs(const ModeForms& forms);
 /// On the basis that both points share. Not collective.
 ModeForms forms_between(const PointModes& from, const PointModes& to);
 
-/// For each eigenvalue of one list its partner in another, the nearest, each at most once; -1: the other is shorter.
-/// Not collective.
-std::vector<int> nearest_partners(const std::vector<std::complex<double>>& from,
-                                  const std::vector<std::complex<double>>& to);
-
 /// For each mode of a point the place of the mode of a reference that it shares most with, and whose frequency is not
 /// far from its own; -1: it is like none. Not collective.
 std::vector<int> names_by_shapes(const PointModes& reference, const PointModes& point);

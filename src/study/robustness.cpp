@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <boost/math/distributions/binomial.hpp>
+#include <boost/math/statistics/bivariate_statistics.hpp>
 #include <numeric>
 
 namespace squeal
@@ -23,17 +24,18 @@ std::vector<double> values_at(const std::vector<UncertainNumber>& numbers, const
 }
 
 /// The medians, then the samples. Collective: it ends where the run is asked to.
-std::vector<std::vector<double>> random_values(const RobustnessProblem& problem, MPI_Comm comm)
+std::vector<std::vector<double>> random_values(const RobustnessSettings& settings,
+                                               const std::vector<UncertainNumber>& numbers, MPI_Comm comm)
 {
   constexpr int between = 1 << 14; // samples, a few milliseconds
-  std::mt19937_64 generator(static_cast<std::uint64_t>(problem.settings.seed));
-  std::vector<std::vector<double>> points{values_at(problem.numbers, std::vector(problem.numbers.size(), 0.5))};
-  for (int k = 0; k < problem.settings.samples; ++k)
+  std::mt19937_64 generator(static_cast<std::uint64_t>(settings.seed));
+  std::vector<std::vector<double>> points{values_at(numbers, std::vector(numbers.size(), 0.5))};
+  for (int k = 0; k < settings.samples; ++k)
   {
     if (k % between == 0) end_if_asked(comm);
     std::vector<double> parts;
-    for (std::size_t i = 0; i < problem.numbers.size(); ++i) parts.push_back(uniform(generator));
-    points.push_back(values_at(problem.numbers, parts));
+    for (std::size_t i = 0; i < numbers.size(); ++i) parts.push_back(uniform(generator));
+    points.push_back(values_at(numbers, parts));
   }
   return points;
 }
@@ -52,12 +54,7 @@ std::vector<double> ranks_of_values(const std::vector<double>& values)
 /// Spearman's coefficient of rank correlation.
 double rank_correlation(const std::vector<double>& a, const std::vector<double>& b)
 {
-  if (a.size() < 2) return 0;
-  const std::vector<double> x = ranks_of_values(a), y = ranks_of_values(b);
-  const double n = static_cast<double>(a.size());
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += (x[i] - y[i]) * (x[i] - y[i]);
-  return 1 - 6 * sum / (n * (n * n - 1));
+  return a.size() < 2 ? 0 : boost::math::statistics::correlation_coefficient(ranks_of_values(a), ranks_of_values(b));
 }
 
 bool is_known(const SweepPoint& sample)
@@ -83,7 +80,7 @@ std::vector<double> correlations_of(const std::vector<SweepPoint>& samples, std:
 }
 
 /// The unstable modes of the samples that are one mode of the reference, or like none.
-RobustMode unstable_as(int mode, const std::vector<SweepPoint>& samples, const RobustnessProblem& problem)
+RobustMode unstable_as(int mode, const std::vector<SweepPoint>& samples, double confidence)
 {
   RobustMode robust;
   robust.number = mode;
@@ -99,8 +96,7 @@ RobustMode unstable_as(int mode, const std::vector<SweepPoint>& samples, const R
     }
     count += robust.frequencies.size() > before;
   }
-  robust.unstable =
-      probability_of(count, static_cast<int>(std::ranges::count_if(samples, is_known)), problem.settings.confidence);
+  robust.unstable = probability_of(count, static_cast<int>(std::ranges::count_if(samples, is_known)), confidence);
   std::ranges::sort(robust.growth_rates);
   std::ranges::sort(robust.frequencies);
   return robust;
@@ -125,14 +121,11 @@ Probability probability_of(int count, int samples, double confidence)
   return result;
 }
 
-Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
+Robustness find_robustness(const RobustnessSettings& settings, const std::vector<UncertainNumber>& numbers,
+                           SweepProblem problem, MPI_Comm comm)
 {
-  SweepSettings points;
-  for (const UncertainNumber& number : problem.numbers) points.key.push_back(number.key);
-  points.design = random_values(problem, comm);
-  Sweep sweep = run_sweep(
-      {points, problem.model_at, problem.modes, problem.modes_options, problem.equilibrium_options, "robustness"},
-      comm);
+  problem.settings.design = random_values(settings, numbers, comm);
+  Sweep sweep = run_sweep(problem, comm);
   if (sweep.outcome.kind == OutcomeKind::interrupted) throw Interrupted{};
   Robustness result;
   result.outcome = sweep.outcome;
@@ -146,13 +139,13 @@ Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm)
   result.outcome.iterations = static_cast<int>(result.samples.size());
   const auto any = std::ranges::count_if(result.samples, [](const SweepPoint& s) { return s.unstable > 0; });
   result.any = probability_of(static_cast<int>(any), static_cast<int>(std::ranges::count_if(result.samples, is_known)),
-                              problem.settings.confidence);
-  result.modes.push_back(unstable_as(-1, result.samples, problem));
+                              settings.confidence);
+  result.modes.push_back(unstable_as(-1, result.samples, settings.confidence));
   for (const SweptMode& mode : reference.modes)
-    result.modes.emplace_back(unstable_as(mode.track, result.samples, problem)).lambda = mode.lambda;
+    result.modes.emplace_back(unstable_as(mode.track, result.samples, settings.confidence)).lambda = mode.lambda;
   std::erase_if(result.modes, [](const RobustMode& mode) { return mode.unstable.count == 0; });
   std::ranges::stable_sort(result.modes, std::greater{}, [](const RobustMode& mode) { return mode.unstable.count; });
-  result.correlation = correlations_of(result.samples, problem.numbers.size());
+  result.correlation = correlations_of(result.samples, numbers.size());
   return result;
 }
 

@@ -43,18 +43,8 @@ struct Robustness
   int basis = 0;                   // shapes in the end
 };
 
-/// The scene's random numbers and how a sample is computed.
-struct RobustnessProblem
-{
-  const RobustnessSettings& settings;
-  const std::vector<UncertainNumber>& numbers;
-  std::function<BrakeModel(std::span<const double> values)> model_at;
-  const ModesSettings& modes;
-  const ModesOptions& modes_options;
-  const EquilibriumOptions& equilibrium_options;
-};
-
-/// Collective.
-Robustness find_robustness(const RobustnessProblem& problem, MPI_Comm comm);
+/// By samples of the scene's random numbers, whose keys are those of the problem. Collective.
+Robustness find_robustness(const RobustnessSettings& settings, const std::vector<UncertainNumber>& numbers,
+                           SweepProblem problem, MPI_Comm comm);
 
 } // namespace squeal

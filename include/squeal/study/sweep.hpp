@@ -74,7 +74,7 @@ struct Sweep
 /// The points to visit and how each is computed.
 struct SweepProblem
 {
-  const SweepSettings& settings;
+  SweepSettings settings;
   std::function<BrakeModel(std::span<const double> values)> model_at;
   const ModesSettings& modes;
   const ModesOptions& modes_options;
