@@ -16,8 +16,8 @@ Response run_response(const SlidingPoint& point, const Scene& scene, const Progr
   for (std::size_t i = 0; i < scene.probes.size(); ++i)
     if (scene.response->excitation.empty() || std::ranges::count(scene.response->excitation, scene.probes[i].name) > 0)
       excitations.push_back(static_cast<int>(i));
-  return find_response({point.sliding(), *point.linearised, point.model->probes, excitations,
-                        frequencies_of(*scene.response), options.response, options.modes.pencil});
+  return find_response({point.sliding(), point.model->probes, excitations, frequencies_of(*scene.response),
+                        options.response, options.modes});
 }
 
 Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const Scene& scene,
@@ -149,12 +149,13 @@ Sweep run_scene_sweep(const Model& model, const Scene& scene, const ProgramOptio
 
 Robustness run_robustness(const Model& model, const Scene& scene, const ProgramOptions& options)
 {
-  std::vector<std::string> keys;
-  for (const UncertainNumber& number : scene.uncertain) keys.push_back(number.key);
+  SweepSettings points;
+  for (const UncertainNumber& number : scene.uncertain) points.key.push_back(number.key);
   NearbyModels models(model, scene, comm_of(model.structure.load));
-  const auto model_at = [&](std::span<const double> values) { return models.at(numbers_of(keys, values)); };
-  return find_robustness(
-      {*scene.robustness, scene.uncertain, model_at, scene.modes, options.modes, options.equilibrium}, models.comm());
+  const auto model_at = [&](std::span<const double> values) { return models.at(numbers_of(points.key, values)); };
+  return find_robustness(*scene.robustness, scene.uncertain,
+                         {points, model_at, scene.modes, options.modes, options.equilibrium, "robustness"},
+                         models.comm());
 }
 
 } // namespace squeal

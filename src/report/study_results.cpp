@@ -169,8 +169,7 @@ void add_response(Entry out, const Report& report)
   out.check(response.outcome.kind == OutcomeKind::converged, "residual", "-", "residual force over a unit force",
             response.outcome.residual);
   out.show("change", "-", "relative change of a receptance by the last correction", response.change);
-  out.add("parts", "-", "parts of the band, each with a basis of its own", response.parts);
-  out.show("shapes", "-", "shapes of the largest basis", response.shapes);
+  out.show("shapes", "-", "shapes of the basis", response.shapes);
   const Entry peaks = out.list("peaks");
   const std::vector<Probe>& probes = out.scene().probes;
   for (std::size_t i = 0; i < response.excitations.size(); ++i)

@@ -97,13 +97,6 @@ struct SolvedPairs
   double backward_error(std::size_t k) const { return left[k] <= right[k] ? right[k] : left[k]; } // NaN of either
 };
 
-/// w^2 |M| + w |C| + |K|, w = |lambda|
-double scale_of(const ModesBasis& modes, Complex lambda)
-{
-  const double w = std::abs(lambda);
-  return w * w * modes.norms.M + w * modes.norms.C + modes.norms.K;
-}
-
 /// Backward errors in the full problem, estimated by the random vectors. Left vectors solve the transposed problem.
 std::vector<double> backward_errors(const ModesBasis& modes, const PointMatrices& on_basis,
                                     const std::vector<TwoSidedPair>& pairs, Side side)
@@ -245,18 +238,6 @@ SolvedPairs solve_projected(const ModesBasis& modes, const PointMatrices& on_bas
   return with_errors(modes, on_basis, std::move(pairs));
 }
 
-/// The corrections (K_z - tau M_z)^-1 r of residuals join the basis. Returns whether they add anything.
-bool correct(ModesBasis& modes, MultiVector residuals)
-{
-  PetscInt unknowns = 0;
-  check(MatGetSize(modes.K_z, &unknowns, nullptr));
-  if (residuals.columns() == 0 || modes.basis.shapes() >= unknowns) return false;
-  orthonormalise(residuals, waiting_share * waiting_share);
-  const MultiVector responses = modes.pencil.factor->solve(product(modes.Z_transposed, residuals));
-  ++modes.passes;
-  return extend(modes.basis, product(modes.contact.Z, responses)) > 0;
-}
-
 /// The result of a point, without what is no mode.
 PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const PointMatrices& on_basis, Index shapes)
 {
@@ -287,6 +268,23 @@ PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const Poin
 }
 
 } // namespace
+
+double scale_of(const ModesBasis& modes, Complex lambda)
+{
+  const double w = std::abs(lambda);
+  return w * w * modes.norms.M + w * modes.norms.C + modes.norms.K;
+}
+
+bool correct(ModesBasis& modes, MultiVector residuals)
+{
+  PetscInt unknowns = 0;
+  check(MatGetSize(modes.K_z, &unknowns, nullptr));
+  if (residuals.columns() == 0 || modes.basis.shapes() >= unknowns) return false;
+  orthonormalise(residuals, waiting_share * waiting_share);
+  const MultiVector responses = modes.pencil.factor->solve(product(modes.Z_transposed, residuals));
+  ++modes.passes;
+  return extend(modes.basis, product(modes.contact.Z, responses)) > 0;
+}
 
 bool in_band(const TwoSidedPair& pair, double band)
 {

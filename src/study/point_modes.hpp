@@ -43,6 +43,13 @@ ModesBasis make_modes_basis(const BasisProblem& problem, const std::vector<char>
 /// Goes over to fewer closed pairs: their modes join the basis, whose shapes keep their places.
 void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<char>& closed);
 
+/// The corrections (K_z - tau M_z)^-1 r of residuals join the basis, but for those much smaller than the largest.
+/// Returns whether they add anything.
+bool correct(ModesBasis& modes, MultiVector residuals);
+
+/// The scale of backward errors, w^2 |M| + w |C| + |K| with w = |lambda| [N/m].
+double scale_of(const ModesBasis& modes, std::complex<double> lambda);
+
 /// What modes are sought on, and how exactly.
 struct PointProblem
 {

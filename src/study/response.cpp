@@ -1,18 +1,16 @@
 #include "squeal/study/response.hpp"
 
+#include "point_modes.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
-#include "squeal/algebra/shift_invert.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/modes/dense_losses.hpp"
-#include "squeal/modes/quadratic.hpp"
-#include "squeal/reduction/sliding_basis.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <Eigen/LU>
+#include <numeric>
 
 namespace squeal
 {
@@ -25,8 +23,7 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-constexpr Index sketches = 32;        // random vectors: a norm is off by 13 % (one standard deviation)
-constexpr double variance = 1. / 3;   // of their entries, even in (-1, 1)
+constexpr double variance = 1. / 3;   // of the random vectors' entries, even in (-1, 1)
 constexpr double least_error = 1e-14; // backward error that no correction makes smaller
 constexpr std::size_t few = 16;       // frequencies whose residuals are estimated before those of all are
 constexpr double deep = 1e-4;         // part of the largest |H| at a frequency; below it errors are relative to this
@@ -34,22 +31,10 @@ constexpr double deep = 1e-4;         // part of the largest |H| at a frequency;
 /// The forces of a side: at the driven probes, Y'p, those of right vectors; at the read ones, Z'p, those of left ones.
 struct UnitForces
 {
-  MultiVector columns;
-  std::vector<double> sizes{}; // of p
+  MultiVector columns;       // on the kept degrees of freedom
+  std::vector<double> sizes; // of p
 };
 
-/// The equations of section 13.1 and their transposes, with the forces of both sides.
-struct Equations
-{
-  LinearisedPoint point;
-  QuadraticProblem sliding;
-  QuadraticNorms norms{};
-  std::array<UnitForces, 2> forces{}; // by sides
-
-  const UnitForces& of(Side side) const { return forces[static_cast<std::size_t>(side)]; }
-};
-
-/// Unit forces at probes on the kept degrees of freedom: basis'p.
 UnitForces unit_forces(Mat probes, const std::vector<int>& rows, Mat basis)
 {
   const MultiVector all = dense_columns(transpose_of(probes)), p{all.comm, all.entries(Eigen::all, rows)};
@@ -57,61 +42,52 @@ UnitForces unit_forces(Mat probes, const std::vector<int>& rows, Mat basis)
   return {product(transpose_of(basis), p), {sizes.begin(), sizes.end()}};
 }
 
-std::vector<int> all_rows(Mat probes)
+/// The equations of section 13.1 and their transposes, with the basis of both kinds of solutions.
+struct ForcedPoint
 {
-  PetscInt count = 0;
-  check(MatGetSize(probes, &count, nullptr));
-  std::vector<int> rows;
-  for (PetscInt i = 0; i < count; ++i) rows.push_back(static_cast<int>(i));
-  return rows;
-}
-
-Equations make_equations(const ResponseProblem& problem)
-{
-  Equations equations{linearise_point(problem.sliding), sliding_problem(problem.sliding.structure, problem.linearised)};
-  const ClosedContact& contact = equations.point.contact;
-  equations.norms = norms_of(equations.sliding);
-  equations.forces = {unit_forces(problem.probes, problem.excitations, contact.Y),
-                      unit_forces(problem.probes, all_rows(problem.probes), contact.Z)};
-  return equations;
-}
-
-/// A basis of both kinds of solutions, with what it makes of the equations.
-struct HarmonicBasis
-{
-  const Equations& equations;
-  SlidingBasis on;
+  LinearisedPoint point;
+  std::array<UnitForces, 2> forces; // by sides
+  ModesBasis modes;
   ProjectedSliding projected{};
-  std::array<MatrixXd, 2> forces{}; // of each side: products with the basis, those of the random vectors first
+  std::array<MatrixXd, 2> on_basis{}; // of each side: products with the basis, those of the random vectors first
 
-  Index size() const { return on.shapes(); }
+  Index size() const { return modes.basis.shapes(); }
 };
 
-/// Appends what X adds to the span. Returns the number of shapes gained. Collective.
-Index extend(HarmonicBasis& basis, const MultiVector& X)
+ForcedPoint make_forced_point(const ResponseProblem& problem, LinearisedPoint point)
 {
-  const LinearisedPoint& point = basis.equations.point;
-  const Index gained = extend(basis.on, product(point.contact.Z, X));
-  if (gained == 0) return 0;
-  basis.projected = project(basis.on, point);
-  const MultiVector kept = kept_rows(basis.on.T, point.contact);
-  for (const Side side : {Side::right, Side::left})
-    basis.forces[static_cast<std::size_t>(side)] = inner_products(kept, basis.equations.of(side).columns);
-  return gained;
+  const auto& [structure, interface, equilibrium] = problem.sliding;
+  PetscInt probes = 0;
+  check(MatGetSize(problem.probes, &probes, nullptr));
+  std::vector<int> all(static_cast<std::size_t>(probes));
+  std::iota(all.begin(), all.end(), 0);
+  std::array forces{unit_forces(problem.probes, problem.excitations, point.contact.Y),
+                    unit_forces(problem.probes, all, point.contact.Z)};
+  const std::vector<char>& closed = equilibrium.closed;
+  return {std::move(point), std::move(forces),
+          make_modes_basis({structure, interface, closed, problem.frequency_hz.back(), problem.modes_options}, closed)};
 }
 
-/// Solutions of both sides at a frequency on a basis, and what they leave over on its random vectors.
+/// Puts the equations on the basis as it is.
+void project(ForcedPoint& forced)
+{
+  forced.projected = project(forced.modes.basis, forced.point);
+  const MultiVector kept = kept_rows(forced.modes.basis.T, forced.point.contact);
+  for (const std::size_t side : {0, 1}) forced.on_basis[side] = inner_products(kept, forced.forces[side].columns);
+}
+
+/// Solutions of both sides at a frequency on the basis, and what they leave over on its random vectors.
 struct HarmonicSolution
 {
   std::array<MatrixXcd, 2> a{}, left_over{}; // a column a force
 };
 
-HarmonicSolution solve_at(double omega, const HarmonicBasis& basis)
+HarmonicSolution solve_at(double omega, const ForcedPoint& forced)
 {
-  const Index size = basis.size();
-  const auto& [M, C, K, K_loss] = basis.projected;
+  const Index size = forced.size(), sketches = forced.modes.basis.sketched;
+  const auto& [M, C, K, K_loss] = forced.projected;
   const MatrixXcd Q = sum({M, C, K, K_loss}, loss_factors({0, omega}));
-  const auto& [driven, read] = basis.forces;
+  const auto& [driven, read] = forced.on_basis;
   const Eigen::PartialPivLU<MatrixXcd> inverse(Q.block(sketches, sketches, size, size));
   HarmonicSolution solution;
   auto& [a, d] = solution.a;
@@ -125,47 +101,53 @@ HarmonicSolution solve_at(double omega, const HarmonicBasis& basis)
 /// Responses on the basis at a list of frequencies, one a column.
 struct HarmonicScan
 {
-  MatrixXcd receptance; // H: rows of what is read within what is driven
-  MatrixXd residuals;   // of all driven forces, then of all that are read, over the unit force
-  MatrixXd defects;     // the same over what is allowed
-  Index driven = 0;     // number of forces, the first rows of both
-
-  /// The geometric mean, at each frequency, of the largest value of either side.
-  Eigen::RowVectorXd means_of(const MatrixXd& rows) const
-  {
-    const Eigen::RowVectorXd largest = rows.topRows(driven).colwise().maxCoeff();
-    return largest.cwiseProduct(rows.bottomRows(rows.rows() - driven).colwise().maxCoeff()).cwiseSqrt();
-  }
+  MatrixXcd receptance;                // H: rows of what is read within what is driven
+  std::array<MatrixXd, 2> residuals{}; // of each side's forces, over the unit force
+  std::array<MatrixXd, 2> defects{};   // the same over what is allowed
 };
+
+/// The geometric mean, at each frequency, of the largest value of either side.
+Eigen::RowVectorXd means_of(const std::array<MatrixXd, 2>& sides)
+{
+  const Eigen::RowVectorXd right = sides[0].colwise().maxCoeff();
+  return right.cwiseProduct(sides[1].colwise().maxCoeff()).cwiseSqrt();
+}
+
+bool is_small(const HarmonicScan& found)
+{
+  return means_of(found.defects).maxCoeff() <= 1;
+}
 
 /// Each rank solves frequencies of its own; all have the result. `tolerance`: residual allowed; rounding is allowed in
 /// any case. Collective.
-HarmonicScan scan(const HarmonicBasis& basis, const std::vector<double>& omega, double tolerance)
+HarmonicScan scan(const ForcedPoint& forced, const std::vector<double>& omega, double tolerance)
 {
   const auto count = static_cast<Index>(omega.size());
-  const Equations& equations = basis.equations;
-  const Index b = equations.of(Side::right).columns.columns(), c = equations.of(Side::left).columns.columns();
-  HarmonicScan result{MatrixXcd::Zero(b * c, count), MatrixXd::Zero(b + c, count), MatrixXd::Zero(b + c, count), b};
-  const MPI_Comm comm = basis.on.T.comm;
+  const auto rows = [&](std::size_t side) { return std::ssize(forced.forces[side].sizes); };
+  HarmonicScan result{MatrixXcd::Zero(rows(0) * rows(1), count)};
+  for (const std::size_t side : {0, 1})
+    result.residuals[side] = result.defects[side] = MatrixXd::Zero(rows(side), count);
+  const MPI_Comm comm = forced.modes.basis.T.comm;
   for (Index f = rank_of(comm); f < count; f += ranks_of(comm))
   {
     const double at = omega[static_cast<std::size_t>(f)];
-    const HarmonicSolution solution = solve_at(at, basis);
-    result.receptance.col(f) = (basis.forces[1].bottomRows(basis.size()).transpose() * solution.a[0]).reshaped();
-    const double scale = at * (at * equations.norms.M + equations.norms.C) + equations.norms.K;
-    for (Index row = 0; row < b + c; ++row)
-    {
-      const std::size_t side = row < b ? 0 : 1;
-      const Index force = row < b ? row : row - b;
-      const double size_of_force = equations.forces[side].sizes[static_cast<std::size_t>(force)];
-      result.residuals(row, f) =
-          solution.left_over[side].col(force).norm() / std::sqrt(variance * sketches) / size_of_force;
-      const double allowed = least_error * scale * solution.a[side].col(force).norm() / size_of_force; // |T a| = |a|
-      result.defects(row, f) = result.residuals(row, f) / std::max(tolerance, allowed);
-    }
+    const HarmonicSolution solution = solve_at(at, forced);
+    result.receptance.col(f) = (forced.on_basis[1].bottomRows(forced.size()).transpose() * solution.a[0]).reshaped();
+    for (const std::size_t side : {0, 1})
+      for (Index force = 0; force < rows(side); ++force)
+      {
+        const double unit = forced.forces[side].sizes[static_cast<std::size_t>(force)],
+                     sketches = static_cast<double>(forced.modes.basis.sketched),
+                     residual = solution.left_over[side].col(force).norm() / std::sqrt(variance * sketches) / unit,
+                     rounding =
+                         least_error * scale_of(forced.modes, {0, at}) * solution.a[side].col(force).norm() / unit;
+        result.residuals[side](force, f) = residual;
+        result.defects[side](force, f) = residual / std::max(tolerance, rounding); // |T a| = |a|
+      }
   }
-  for (MatrixXd* part : {&result.residuals, &result.defects}) // zeros but on one rank: the sums are exact
-    MPI_Allreduce(MPI_IN_PLACE, part->data(), to_int(part->size()), MPI_DOUBLE, MPI_SUM, comm);
+  for (std::array<MatrixXd, 2>* sides : {&result.residuals, &result.defects})
+    for (MatrixXd& part : *sides) // zeros but on one rank: the sums are exact
+      MPI_Allreduce(MPI_IN_PLACE, part.data(), to_int(part.size()), MPI_DOUBLE, MPI_SUM, comm);
   MPI_Allreduce(MPI_IN_PLACE, result.receptance.data(), to_int(2 * result.receptance.size()), MPI_DOUBLE, MPI_SUM,
                 comm);
   return result;
@@ -180,84 +162,43 @@ std::vector<double> thinned(const std::vector<double>& omega, std::size_t most)
   return result;
 }
 
-/// P^-1 r of each force, at the frequency of its largest residual. Small ones are left out unless all are small.
-MultiVector corrections(const HarmonicBasis& basis, const std::vector<double>& omega, const HarmonicScan& found,
-                        const PencilFactor& P)
+/// Corrects the basis by the residual of each force at the frequency where it is largest. Small ones are left out
+/// unless all are small. Returns whether they add anything.
+bool correct(ForcedPoint& forced, const std::vector<double>& omega, const HarmonicScan& found)
 {
-  const bool all_small = found.means_of(found.defects).maxCoeff() <= 1;
-  const Index driven = found.driven, read = found.defects.rows() - driven;
-  const std::array<Eigen::RowVectorXd, 2> largest = {found.defects.topRows(driven).colwise().maxCoeff(),
-                                                     found.defects.bottomRows(read).colwise().maxCoeff()};
-  MultiVector result = empty_multivector(basis.equations.sliding.K);
+  const bool all_small = is_small(found);
+  const LinearisedPoint& point = forced.point;
+  MultiVector residuals{forced.modes.basis.T.comm, MatrixXd(forced.modes.basis.T.entries.rows(), 0)};
   for (const Side side : {Side::right, Side::left})
   {
     const auto which = static_cast<std::size_t>(side);
-    const Index first = which == 0 ? 0 : driven, count = which == 0 ? driven : read;
-    std::vector<Index> forces;
+    const auto& [columns, sizes] = forced.forces[which];
+    const Eigen::RowVectorXd of_other = found.defects[1 - which].colwise().maxCoeff();
     std::vector<Complex> lambda;
-    MatrixXcd a(basis.size(), 0);
-    for (Index force = 0; force < count; ++force)
+    MatrixXcd a(forced.size(), 0);
+    MultiVector unit{columns.comm, MatrixXd(columns.entries.rows(), 0)};
+    for (Index force = 0; force < columns.columns(); ++force)
     {
       Index worst = 0;
-      const Eigen::RowVectorXd squares = found.defects.row(first + force).cwiseProduct(largest[1 - which]);
-      if (squares.maxCoeff(&worst) <= 1 && !all_small) continue;
-      const double at = omega[static_cast<std::size_t>(worst)];
-      forces.push_back(force);
+      if (found.defects[which].row(force).cwiseProduct(of_other).maxCoeff(&worst) <= 1 && !all_small) continue;
+      const double at = omega[static_cast<std::size_t>(worst)], size = sizes[static_cast<std::size_t>(force)];
       lambda.emplace_back(0, at);
       a.conservativeResize(Eigen::NoChange, a.cols() + 1);
-      a.rightCols(1) = solve_at(at, basis).a[which].col(force);
+      a.rightCols(1) = solve_at(at, forced).a[which].col(force) / size;
+      append(unit, {columns.comm, columns.entries.col(force) / size});
     }
-    if (forces.empty()) continue;
+    if (lambda.empty()) continue;
     const auto y = [&](const MatrixXcd& weights)
-    { return kept_rows(combination_of_shapes(basis.on, (a * weights).real()), basis.equations.point.contact); };
+    { return kept_rows(combination_of_shapes(forced.modes.basis, (a * weights).real()), point.contact); };
     const MatrixXcd one = MatrixXcd::Identity(a.cols(), a.cols());
     MatrixXcd parts(a.cols(), 2 * a.cols()); // the real parts of all, then the imaginary parts
     parts << one, Complex(0, -1) * one;
-    MultiVector residuals = dynamic_forces(basis.on, basis.equations.point, side,
-                                           {Eigen::VectorXcd::Map(lambda.data(), a.cols()), parts, y});
-    residuals.entries.leftCols(a.cols()) -= basis.equations.of(side).columns.entries(Eigen::all, forces);
-    append(result, P.solve(residuals));
+    MultiVector left_over =
+        dynamic_forces(forced.modes.basis, point, side, {Eigen::VectorXcd::Map(lambda.data(), a.cols()), parts, y});
+    left_over.entries.leftCols(a.cols()) -= unit.entries;
+    append(residuals, with_zero_pivots(left_over, point.contact));
   }
-  return result;
-}
-
-/// What the basis of a part of the band gives at its frequencies.
-struct PartResponse
-{
-  HarmonicScan found;
-  MatrixXcd before; // H without the last correction
-  Index shapes = 0;
-};
-
-/// Extends a basis until its residuals are small, once more after they first are, or no correction adds to it. Nothing
-/// where it would grow too large.
-std::optional<PartResponse> solve_part(const Equations& equations, const std::vector<double>& omega,
-                                       ShiftInvert& pencil, const ResponseOptions& options)
-{
-  const auto& [structure, interface, equilibrium] = equations.point.sliding;
-  HarmonicBasis basis{equations, make_basis(structure, interface, sketches)};
-  move_to(pencil, (omega.front() * omega.front() + omega.back() * omega.back()) / 2);
-  MultiVector start = pencil.factor->solve(equations.of(Side::right).columns);
-  append(start, pencil.factor->solve(equations.of(Side::left).columns));
-  extend(basis, start);
-  MatrixXcd before; // H at all frequencies of the part, without the last correction
-  for (;;)
-  {
-    end_if_asked(basis.on.T.comm);
-    const auto is_small = [](const HarmonicScan& found) { return found.means_of(found.defects).maxCoeff() <= 1; };
-    std::vector<double> at = thinned(omega, few);
-    HarmonicScan found = scan(basis, at, options.tolerance);
-    if (is_small(found) && at.size() < omega.size()) found = scan(basis, at = omega, options.tolerance);
-    const bool small = is_small(found), whole = at.size() == omega.size();
-    if (!small && basis.size() > options.shapes && omega.size() > 1) return std::nullopt;
-    bool ended = (small && before.size() > 0) || basis.size() > 2 * options.shapes;
-    if (!ended && whole) before = found.receptance;
-    ended = ended || extend(basis, corrections(basis, at, found, *pencil.factor)) == 0;
-    if (!ended) continue;
-    if (!whole) found = scan(basis, omega, options.tolerance);
-    if (before.size() == 0) before = found.receptance;
-    return PartResponse{found, before, basis.size()};
-  }
+  return correct(forced.modes, std::move(residuals));
 }
 
 /// The largest change of H from `coarse` to `fine`, over |H| or `deep` of the largest at the frequency.
@@ -275,51 +216,46 @@ double largest_change(const MatrixXcd& coarse, const MatrixXcd& fine, Index read
   return largest;
 }
 
-/// Takes over the responses at the frequencies from `first` on.
-void store(const MatrixXcd& receptance, std::size_t first, Response& response)
+/// Corrects the basis until the residuals are small, once more after they first are, or no correction adds to it.
+void solve(const ResponseProblem& problem, ForcedPoint& forced, Response& response)
 {
-  const std::size_t read = response.receptance.front().size();
-  for (Index f = 0; f < receptance.cols(); ++f)
-    for (Index row = 0; row < receptance.rows(); ++row)
-      response.receptance[static_cast<std::size_t>(row) / read][static_cast<std::size_t>(row) % read]
-                         [first + static_cast<std::size_t>(f)] = receptance(row, f);
-}
-
-/// A part of the frequencies, [first, end).
-struct Part
-{
-  std::size_t first = 0, end = 0;
-};
-
-void solve_band(const ResponseProblem& problem, const Equations& equations, Response& response)
-{
-  const MPI_Comm comm = comm_of(equations.sliding.K);
-  ShiftInvert pencil = make_shift_invert(problem.linearised.K_z, problem.linearised.M_z, Keep::factor, problem.pencil);
-  std::vector<Part> parts = {{0, problem.frequency_hz.size()}}; // those still to come, the lowest last
-  Progress progress(comm, "response", static_cast<double>(problem.frequency_hz.size()));
-  while (!parts.empty())
+  const auto& [tolerance, passes] = problem.options;
+  std::vector<double> omega;
+  for (const double frequency : problem.frequency_hz) omega.push_back(two_pi * frequency);
+  const MPI_Comm comm = forced.modes.basis.T.comm;
+  MultiVector start{comm, MatrixXd(forced.modes.basis.T.entries.rows(), 0)};
+  for (const auto& [columns, sizes] : forced.forces) append(start, with_zero_pivots(columns, forced.point.contact));
+  correct(forced.modes, std::move(start));
+  Progress progress(comm, "response", passes);
+  HarmonicScan found;
+  MatrixXcd before; // H at all frequencies, without the last correction
+  for (int pass = 0;; ++pass)
   {
-    const Part part = parts.back();
-    parts.pop_back();
-    std::vector<double> omega;
-    for (std::size_t f = part.first; f < part.end; ++f) omega.push_back(two_pi * problem.frequency_hz[f]);
-    const auto solved = solve_part(equations, omega, pencil, problem.options);
-    if (!solved)
-    {
-      const std::size_t middle = (part.first + part.end) / 2;
-      parts.insert(parts.end(), {Part{middle, part.end}, Part{part.first, middle}});
-      continue;
-    }
-    const auto& [found, before, shapes] = *solved;
-    store(found.receptance, part.first, response);
-    response.change =
-        std::max(response.change, largest_change(before, found.receptance, equations.of(Side::left).columns.columns()));
-    response.outcome.residual = std::max(response.outcome.residual, found.means_of(found.residuals).maxCoeff());
-    if (found.means_of(found.defects).maxCoeff() > 1) response.outcome.kind = OutcomeKind::not_converged;
-    response.parts += 1;
-    response.shapes = std::max(response.shapes, static_cast<int>(shapes));
-    progress.update(static_cast<double>(part.end), format("%d shapes", static_cast<int>(shapes)));
+    end_if_asked(comm);
+    project(forced);
+    std::vector<double> at = thinned(omega, few);
+    found = scan(forced, at, tolerance);
+    if (is_small(found) && at.size() < omega.size()) found = scan(forced, at = omega, tolerance);
+    const bool small = is_small(found), whole = at.size() == omega.size();
+    bool ended = (small && before.size() > 0) || pass >= passes;
+    if (!ended && whole) before = found.receptance;
+    ended = ended || !correct(forced, at, found);
+    progress.update(pass, format("%d shapes", static_cast<int>(forced.size())));
+    if (!ended) continue;
+    if (!whole) found = scan(forced, omega, tolerance);
+    break;
   }
+  if (before.size() > 0) response.change = largest_change(before, found.receptance, std::ssize(forced.forces[1].sizes));
+  response.outcome.residual = means_of(found.residuals).maxCoeff();
+  if (!is_small(found)) response.outcome.kind = OutcomeKind::not_converged;
+  response.shapes = static_cast<int>(forced.size());
+  const std::size_t read = forced.forces[1].sizes.size();
+  for (std::size_t driven = 0; driven < response.receptance.size(); ++driven)
+    for (std::size_t probe = 0; probe < read; ++probe)
+    {
+      const auto row = found.receptance.row(static_cast<Index>(driven * read + probe));
+      response.receptance[driven][probe].assign(row.begin(), row.end());
+    }
 }
 
 } // namespace
@@ -331,17 +267,21 @@ Response find_response(const ResponseProblem& problem)
   response.frequency_hz = problem.frequency_hz;
   response.excitations = problem.excitations;
   PetscInt probes = 0, free = 0;
+  LinearisedPoint point = linearise_point(problem.sliding);
   check(MatGetSize(problem.probes, &probes, nullptr));
-  check(MatGetSize(problem.linearised.K_z, &free, nullptr));
+  check(MatGetSize(point.contact.Z, nullptr, &free));
   const std::vector<std::complex<double>> nothing(problem.frequency_hz.size());
   response.receptance.assign(problem.excitations.size(), {static_cast<std::size_t>(probes), nothing});
   if (free == 0)
     response.outcome.reason = "closed contact leaves nothing free to vibrate";
   else
-    solve_band(problem, make_equations(problem), response);
+  {
+    ForcedPoint forced = make_forced_point(problem, std::move(point));
+    solve(problem, forced, response);
+  }
   if (response.outcome.kind == OutcomeKind::not_converged)
-    response.outcome.reason = format("residuals up to %.1e of a unit force are left by a basis of %ld shapes",
-                                     response.outcome.residual, static_cast<long>(problem.options.shapes));
+    response.outcome.reason = format("residuals up to %.1e of a unit force are left by a basis of %d shapes",
+                                     response.outcome.residual, response.shapes);
   return response;
 }
 

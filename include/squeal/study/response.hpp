@@ -3,12 +3,10 @@
 /// force at a probe, along its direction. With p_i the row of probe i and Q of section 13,
 ///     H_ji(omega) = p_j'Z q_i,     Q(omega) q_i = Y'p_i.
 ///
-/// All frequencies of a part of the band are solved on one basis. Residuals of the full problem and of its transpose
-/// extend it. The error of H is the product of both.
+/// All frequencies are solved on one basis, that of modes (section 10.2). Residuals of the full problem and of its
+/// transpose extend it. The error of H is the product of both.
 /// Where modes are unstable, H is formal: no vibration settles on it.
-#include "squeal/algebra/pencil_factor.hpp"
-#include "squeal/base/outcome.hpp"
-#include "squeal/equilibrium/linearised_sliding.hpp"
+#include "squeal/modes/modes.hpp"
 
 #include <complex>
 #include <vector>
@@ -25,27 +23,25 @@ struct Response
   std::vector<int> excitations;                                           // the probes that are driven
   std::vector<std::vector<std::vector<std::complex<double>>>> receptance; // [m/N] [excitation][probe][frequency]
   double change = 0; // of H by the last extension of the basis: over |H|, or 1e-4 of the largest |H| at the frequency
-  int parts = 0;     // of the band, each with a basis of its own
-  int shapes = 0;    // of the largest basis
+  int shapes = 0;    // of the basis
 };
 
 /// Options -response_...
 struct ResponseOptions
 {
   double tolerance = 1e-5; // of the geometric mean of both residuals, over a unit force
-  PetscInt shapes = 300;   // of a basis; where more are needed the band is parted
+  int passes = 40;         // corrections of the basis, at most
 };
 
 /// What is driven and read, and at which frequencies.
 struct ResponseProblem
 {
   SlidingEquilibrium sliding;
-  const LinearisedSliding& linearised;
   Mat probes = nullptr;         // a row a probe
   std::vector<int> excitations; // their rows
   std::vector<double> frequency_hz;
   const ResponseOptions& options;
-  const PencilOptions& pencil;
+  const ModesOptions& modes_options;
 };
 
 /// Responses of all probes to every excitation. Collective. Error: memory runs out.
