@@ -29,8 +29,7 @@ constexpr double dense_copies = 24; // of n x n numbers in a dense quadratic pro
 constexpr double vectors_of_modes = 2 * 500 + 300;
 constexpr double vectors_of_modes_kept = 200; // of 100 pairs
 constexpr double vectors_of_shooting = 100;   // pairs of differences, work of a step, columns of the multipliers
-// A basis grows beyond its limit by what one pass adds; with it its copy while it grows, and the random vectors:
-constexpr double passes_of_response = 40;
+constexpr double shapes_of_response = 300;    // beside which there is their copy while the basis grows
 
 double steps_of_transient(const TransientSettings& transient)
 {
@@ -38,23 +37,11 @@ double steps_of_transient(const TransientSettings& transient)
   return transient.steps > 0 ? static_cast<double>(transient.steps) : transient.periods * transient.steps_per_period;
 }
 
-double points_of(const SweepSettings& sweep)
-{
-  double points = static_cast<double>(std::max(sweep.values.size(), sweep.design.size()));
-  if (points == 0) points = sweep.points;
-  return sweep.directions == SweepDirections::both ? 2 * points : points;
-}
-
-double steps_of_period(const Scene& scene)
-{
-  return scene.cycle.steps_per_period > 0 ? scene.cycle.steps_per_period : usual_steps;
-}
-
 double steps_of(const Scene& scene, const ProgramOptions& options)
 {
   double steps = steps_of_transient(scene.transient);
   if (!scene.cycle.enabled) return steps;
-  const double a_period = steps_of_period(scene);
+  const double a_period = scene.cycle.steps_per_period > 0 ? scene.cycle.steps_per_period : usual_steps;
   const double cycle = a_period * std::min(usual_periods, static_cast<double>(options.cycle.shooting.max_periods));
   const double starts = scene.cycle.starts, points = scene.branch ? scene.branch->points : 0;
   return steps + cycle * (1 + starts + points) + a_period * scene.cycle.free_periods;
@@ -83,7 +70,6 @@ struct Sizes
 {
   double dofs = 0, entries = 0;  // of K
   double pairs = 0, contact = 0; // rows of B
-  double of_rest = 0;            // rows of the equilibrium's problem
   double ranks = 1;
   FactorForecast factor{};
 
@@ -103,7 +89,6 @@ Sizes sizes_of(const Model& model, const FactorOptions& options)
   sizes.pairs = model.interface.pairs;
   sizes.ranks = ranks_of(comm_of(K));
   sizes.contact = static_cast<double>(model.interface.size());
-  sizes.of_rest = has_undriven_pairs(model.interface) ? sizes.contact : sizes.pairs;
   sizes.factor = forecast_factor(K, model.interface.pairs > 0 ? model.interface.B.get() : nullptr, options);
   return sizes;
 }
@@ -114,13 +99,12 @@ double memory_of_factor(const Sizes& sizes)
   return sizes.factor.bytes + 2 * triplet * sizes.entries / 2;
 }
 
-/// K with springs at the pairs, its factor, the rows of D, and four matrices of the rows: two parts of D, their sum
-/// with friction, and a factor of that. MUMPS has all of D at first.
+/// K with springs at the pairs, its factor, and five matrices of pairs: two parts of D, their sum with friction, a
+/// factor of that and, with springs, what these take off again.
 double memory_of_equilibrium(const Sizes& sizes)
 {
-  const double first = sizes.factor.kind == FactorKind::mumps ? sizes.condensed_operator() : 0;
-  return matrix_entry * sizes.entries + memory_of_factor(sizes) + first +
-         number * sizes.of_rest * (sizes.contact + 4 * sizes.of_rest);
+  return matrix_entry * sizes.entries + memory_of_factor(sizes) + sizes.condensed_operator() +
+         4 * number * sizes.pairs * sizes.pairs;
 }
 
 /// Six matrices: M and K of the frictionless problem, M, C and K of the sliding one, and C with friction. The pencil of
@@ -140,9 +124,8 @@ double memory_of_response(const Sizes& sizes, const Scene& scene, const ProgramO
   const double driven = static_cast<double>(scene.response->excitation.size()),
                read = static_cast<double>(scene.probes.size());
   const double pairs = (driven > 0 ? driven : read) * read;
-  const double shapes = std::min(sizes.dofs, static_cast<double>(options.response.shapes) + passes_of_response);
   return 8 * matrix_entry * sizes.entries + forecast_pencil(sizes.factor, sizes.entries, options.modes.pencil, comm) +
-         number * (2 * shapes + passes_of_response) * sizes.dofs +
+         number * 2 * std::min(sizes.dofs, shapes_of_response) * sizes.dofs +
          3 * 2 * number * sizes.ranks * pairs * scene.response->count;
 }
 
@@ -175,13 +158,6 @@ double memory_of_cycle(const Sizes& sizes, CycleModel fidelity, double free)
   return least + start + multipliers <= free ? least + start + multipliers : least + start;
 }
 
-/// What the points of a sweep and the samples of a robustness study are laid out in. Their modes come on top.
-double memory_of_points(double points)
-{
-  constexpr double numbers_of_point = 16;
-  return number * numbers_of_point * points;
-}
-
 } // namespace
 
 double Forecast::bytes() const
@@ -202,9 +178,6 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   forecast.factor_limit = 1e9 * options.factor.share_limit();
   forecast.held = sum_of_ranks(memory_entry("/proc/self/status", "VmRSS:").value_or(0), comm);
   const double free = free_memory(comm);
-  const bool whole_operator = scene.cycle.enabled || !shares_operator(sizes); // tangents need one
-  forecast.on_rank_zero = std::max(whole_operator ? sizes.condensed_operator() : 0,
-                                   number * sizes.of_rest * (sizes.contact + 4 * sizes.of_rest));
   // two products a step, each of which reads half of W
   forecast.step_seconds =
       seconds_of_calls + (sizes.factor.bytes + sizes.condensed_operator()) / sizes.ranks / bytes_a_second;
@@ -217,8 +190,12 @@ Forecast forecast_of(const Model& model, const Scene& scene, const ProgramOption
   if (scene.transient.enabled)
     add(Stage::transient, memory_of_step(sizes) + number * entries * steps_of_transient(scene.transient));
   if (scene.cycle.enabled) add(Stage::cycle, memory_of_cycle(sizes, scene.fidelity, free));
-  if (scene.sweep) add(Stage::sweep, memory_of_points(points_of(*scene.sweep)));
-  if (scene.robustness) add(Stage::robustness, memory_of_points(scene.robustness->samples));
+  constexpr double of_point = 16 * number; // of what points and samples are laid out in; their modes come on top
+  if (scene.sweep)
+    add(Stage::sweep, 2 * of_point *
+                          static_cast<double>(std::max(scene.sweep->values.size() + scene.sweep->design.size(),
+                                                       static_cast<std::size_t>(scene.sweep->points))));
+  if (scene.robustness) add(Stage::robustness, of_point * scene.robustness->samples);
   forecast.steps = steps_of(scene, options);
   return forecast;
 }
@@ -239,8 +216,6 @@ std::string text_of(const Forecast& forecast)
   for (const StageForecast& stage : forecast.stages)
     text += format(", %s %.3g MB", word(stage.stage), 1e-6 * stage.bytes);
   text += format("; at most %.3g MB, with up to 120 modes\n", 1e-6 * forecast.bytes());
-  if (forecast.several_ranks)
-    text += format("  of what follows the model, %.3g MB on rank 0 alone\n", 1e-6 * forecast.on_rank_zero);
   text += format("  time forecast, by %.2g Gflop/s and %.2g GB/s a rank: a factor %s", 1e-9 * operations_a_second,
                  1e-9 * bytes_a_second, duration(forecast.factor_seconds).c_str());
   if (forecast.steps > 0)

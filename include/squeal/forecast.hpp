@@ -20,7 +20,6 @@ struct StageForecast
 struct Forecast
 {
   double held = 0;                   // [bytes] resident already: libraries, mesh and matrices of all ranks
-  double on_rank_zero = 0;           // [bytes] of what follows, on rank 0 alone
   std::vector<StageForecast> stages; // those that will run
   double steps = 0;                  // of time
   double step_seconds = 0;           // one step
