@@ -1,4 +1,3 @@
-#include "pivoting.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/path_walk.hpp"
 
@@ -101,7 +100,6 @@ std::optional<VectorXd> unresisted_motion(const PathProblem& problem, const Stic
 
 bool has_no_solution(const StickSlipOperator& of, const VectorXd& q)
 {
-  if (q.size() <= few_pairs) return !rest_by_pivoting(of, q);
   constexpr Index most = 300;     // exchanges, beyond which the proof would take longer than the search
   constexpr double surely = 1e-7; // of the right side
   MatrixXd both(q.size(), 2 * q.size());

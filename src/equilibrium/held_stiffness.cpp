@@ -10,17 +10,6 @@ namespace squeal
 namespace
 {
 
-/// B_n' B_n
-Owned<Mat> normal_springs(const Interface& interface)
-{
-  std::vector<int> all(static_cast<std::size_t>(interface.pairs));
-  std::iota(all.begin(), all.end(), 0);
-  const Owned<Mat> B_n = rows_of(interface, all, RowsTaken::normal);
-  Owned<Mat> product;
-  check(MatTransposeMatMult(B_n, B_n, MAT_INITIAL_MATRIX, PETSC_DEFAULT, product.put()));
-  return product;
-}
-
 /// Any kappa is exact; one of the size of the structure's own stiffness keeps the digits.
 double typical_stiffness(Mat K)
 {
@@ -30,6 +19,23 @@ double typical_stiffness(Mat K)
   double largest = 0;
   check(VecNorm(diagonal, NORM_INFINITY, &largest));
   return largest > 0 ? largest : 1;
+}
+
+/// K with springs kappa across these rows, and its factor.
+Factored add_springs(const Structure& structure, const Interface& interface, Mat rows, const FactorOptions& options,
+                     Held& held)
+{
+  check(MatTransposeMatMult(rows, rows, MAT_INITIAL_MATRIX, PETSC_DEFAULT, held.augmented.put()));
+  check(MatScale(held.augmented, held.kappa)); // K added to these saves a copy of K
+  check(MatAXPY(held.augmented, 1, structure.K, DIFFERENT_NONZERO_PATTERN));
+  check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
+  return factor_positive(held.augmented, interface, options);
+}
+
+[[noreturn]] void throw_loose(const Structure& structure, PetscInt loose)
+{
+  throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
+              describe(structure.names, loose) + "; give it a support or a spring");
 }
 
 } // namespace
@@ -44,11 +50,10 @@ Held hold(const Structure& structure, const Interface& interface, const FactorOp
   {
     own.factor = Factor(); // two of them side by side would be the most that a run ever holds
     held.kappa = typical_stiffness(structure.K);
-    held.augmented = normal_springs(interface); // K added to these saves a copy of K
-    check(MatScale(held.augmented, held.kappa));
-    check(MatAXPY(held.augmented, 1, structure.K, DIFFERENT_NONZERO_PATTERN));
-    check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
-    Factored with_contact = factor_positive(held.augmented, interface, options);
+    std::vector<int> all(static_cast<std::size_t>(interface.pairs));
+    std::iota(all.begin(), all.end(), 0);
+    Factored with_contact =
+        add_springs(structure, interface, rows_of(interface, all, RowsTaken::normal), options, held);
     if (!with_contact.loose && (own.loose || with_contact.resistance > 10 * own.resistance))
     {
       held.factor = std::move(with_contact.factor);
@@ -68,9 +73,7 @@ Held hold(const Structure& structure, const Interface& interface, const FactorOp
                 describe(structure.names, *own.loose) +
                 " is driven on, not back, and the structure diverges (buckles) from any rest; look for a stiffness of "
                 "the wrong sign, or a load beyond the critical one");
-  if (own.loose)
-    throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
-                describe(structure.names, *own.loose) + "; give it a support or a spring");
+  if (own.loose) throw_loose(structure, *own.loose);
   held.factor = std::move(own.factor);
   return held;
 }
@@ -80,14 +83,8 @@ Held hold_by_all_rows(const Structure& structure, const Interface& interface, co
   constexpr double part = 1e-2; // of the structure's stiffness: long chains of bodies lose digits by more
   Held held;
   held.kappa = part * typical_stiffness(structure.K);
-  check(MatTransposeMatMult(interface.B, interface.B, MAT_INITIAL_MATRIX, PETSC_DEFAULT, held.augmented.put()));
-  check(MatScale(held.augmented, held.kappa));
-  check(MatAXPY(held.augmented, 1, structure.K, DIFFERENT_NONZERO_PATTERN));
-  check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
-  Factored factored = factor_positive(held.augmented, interface, options);
-  if (factored.loose)
-    throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
-                describe(structure.names, *factored.loose) + "; give it a support or a spring");
+  Factored factored = add_springs(structure, interface, interface.B, options, held);
+  if (factored.loose) throw_loose(structure, *factored.loose);
   held.factor = std::move(factored.factor);
   return held;
 }

@@ -2,6 +2,7 @@
 
 #include "balance.hpp"
 #include "squeal/base/broadcast.hpp"
+#include "squeal/base/packed.hpp"
 #include "squeal/base/run_control.hpp"
 
 #include <algorithm>
@@ -112,19 +113,18 @@ struct Compliance
 Compliance compliance_of(const PathOperators& operators, const Interface& interface)
 {
   const PairRows<Index> rows(interface.directions);
-  const Index pairs = interface.pairs, size = rows.rows_of(pairs);
-  const Eigen::Map<const MatrixXd> D(operators.D.data(), size, size);
+  const MatrixXd& D = operators.D;
   if (!operators.driven) return {D, D};
   const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
-  const auto normal = Eigen::seqN(0, pairs, rows.per_pair());
-  MatrixXd M = D(normal, normal);
+  const Index pairs = interface.pairs;
+  MatrixXd M = D(Eigen::all, Eigen::seqN(0, pairs, rows.per_pair()));
   Compliance result{M, {}};
   for (Index pair = 0; pair < pairs; ++pair)
     for (Index k = 0; k < rows.directions; ++k)
     {
       const auto i = static_cast<std::size_t>(pair);
       const double e = TangentView(directions, interface.directions).of(i)[static_cast<std::size_t>(k)];
-      M.col(pair) += mu[i] * e * D(normal, rows.tangential(pair) + k);
+      M.col(pair) += mu[i] * e * D.col(rows.tangential(pair) + k);
     }
   result.with_friction = std::move(M);
   return result;
@@ -158,16 +158,8 @@ struct Found
   std::vector<ContactStatus> statuses;
 };
 
-void share(Found& found, MPI_Comm comm)
-{
-  for (int* number : {&found.stopped, &found.completed, &found.impossible, &found.unique, &found.increments,
-                      &found.iterations, &found.index})
-    MPI_Bcast(number, 1, MPI_INT, 0, comm);
-  for (double* number : {&found.change, &found.reciprocal_condition}) MPI_Bcast(number, 1, MPI_DOUBLE, 0, comm);
-  broadcast(found.reason, comm);
-  for (std::vector<double>* list : {&found.r, &found.w, &found.offset}) broadcast(*list, comm);
-  broadcast(found.statuses, comm);
-}
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Found, stopped, completed, impossible, unique, increments, iterations, index, change,
+                                   reciprocal_condition, reason, r, w, offset, statuses)
 
 std::vector<double> as_list(const VectorXd& x)
 {
@@ -251,10 +243,8 @@ void walk_to_end(const PathOperators& operators, const Interface& interface, std
   found.offset = as_list(walk.offset);
   if (!walk.completed)
   {
-    if (operators.driven)
-      found.impossible = has_no_solution(end.of, walk.q);
-    else
-      found.reason = start.state ? walk.reason : mechanism(problem, walk, interface);
+    found.impossible = walk.impossible;
+    if (!operators.driven) found.reason = start.state ? walk.reason : mechanism(problem, walk, interface);
     return;
   }
   if (operators.driven) found.unique = has_one_solution(end.of);
@@ -358,7 +348,27 @@ PathOperators path_operators(const Structure& structure, const Interface& interf
                           driven ? hold(structure, interface, options.factor)
                                  : hold_by_all_rows(structure, interface, options.factor),
                           {}};
-  if (interface.pairs > 0) operators.D = operators.held.factor.condensed(1);
+  if (interface.pairs == 0) return operators;
+  const PairRows<Index> rows(interface.directions);
+  const Index size = rank_of(comm_of(interface.B)) == 0 ? rows.rows_of(interface.pairs) : 0;
+  operators.D.resize(driven ? size / rows.per_pair() : size, size);
+  const auto set = [&](Index row, Index column, double value)
+  {
+    if (!driven)
+      operators.D(row, column) = value;
+    else if (rows.is_normal(row))
+      operators.D(rows.pair_of(row), column) = value;
+  };
+  operators.held.factor.read_condensed(
+      [&](const CondensedStrip& strip)
+      {
+        for (std::size_t j = strip.first; j < strip.last; ++j)
+          for (std::size_t i = j; i < strip.first + strip.height; ++i)
+          {
+            set(static_cast<Index>(i), static_cast<Index>(j), strip.entry(i, j));
+            set(static_cast<Index>(j), static_cast<Index>(i), strip.entry(i, j));
+          }
+      });
   return operators;
 }
 
@@ -428,7 +438,7 @@ Equilibrium find_by_path(const PathOperators& operators, const Structure& struct
                      found.stopped = 1;
                    }
                  });
-    share(found, comm);
+    broadcast_packed(found, comm);
     if (found.stopped) join_parts(comm); // which throws
   }
   Equilibrium equilibrium;

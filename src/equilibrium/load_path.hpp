@@ -18,7 +18,7 @@ struct PathOperators
   Owned<Mat> K, B;
   bool driven = false; // all pairs
   Held held;
-  std::vector<double> D; // compliance of all rows of the pairs, symmetric; on rank 0
+  Eigen::MatrixXd D; // compliance of the rows of the problem to forces on all rows of the pairs; on rank 0
 };
 
 /// Error: as of hold and hold_by_all_rows. Collective.

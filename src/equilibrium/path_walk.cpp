@@ -228,6 +228,8 @@ PathWalk rest_of(const PathProblem& problem, const std::vector<char>& expected)
     walk.state = *std::move(pivoted);
     walk.completed = rests();
   }
+  else
+    walk.impossible = walk.q.size() <= few_pairs || has_no_solution(problem.of, walk.q);
   return walk;
 }
 

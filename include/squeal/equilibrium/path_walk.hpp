@@ -31,6 +31,7 @@ struct PathProblem
 struct PathWalk
 {
   bool completed = false;
+  bool impossible = false;      // it is proved that driven pairs have no solution
   std::string reason;           // why not
   StickSlipState state;         // at the end of the last increment
   Eigen::VectorXd offset;       // [m] of the rows in it: gaps, and minus the anchors of friction
@@ -59,8 +60,8 @@ PathWalk hold_at(const PathProblem& problem, const StickSlipState& from);
 /// that are expected. Without a solution `q` is the problem's all the same.
 PathWalk rest_of(const PathProblem& problem, const std::vector<char>& expected);
 
-/// Whether it is proved that no w >= 0 and r >= 0 of driven pairs fulfil N w = q + M r: by every set of few closed
-/// pairs, or by Farkas in at most some hundred exchanges.
+/// Whether it is proved that no w >= 0 and r >= 0 of driven pairs fulfil N w = q + M r, by Farkas in at most some
+/// hundred exchanges.
 bool has_no_solution(const StickSlipOperator& of, const Eigen::VectorXd& q);
 
 /// Whether one solution is sure: N is 1, and the symmetric part of M is positive definite.
