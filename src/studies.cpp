@@ -107,10 +107,13 @@ BrakeBranch run_branch(const SlidingPoint& point, const Motion& motion, const Sc
   const auto model_at = [&](double parameter) {
     return models.at(std::array{SceneNumber{scene.branch->key, parameter}});
   };
-  return find_branch({*scene.branch, model_at, point.sliding(), stability_beside_branch(models, scene, options),
-                      motion.cycle, point.modes.modes, point.modes.modes[motion.followed.index], scene.fidelity,
-                      steps_along_branch(scene.cycle, motion.cycle), tolerance, point.model->probes, scene.modes,
-                      options.modes, options.equilibrium, options.step, options.cycle.shooting});
+  const std::size_t followed = motion.followed.index;
+  const CycleProblem own{
+      point.sliding(), *point.linearised, point.modes.modes, {std::span(point.modes.modes).subspan(followed, 1), {}},
+      scene.cycle,     options.step,      options.modes,     point.model->probes};
+  return find_branch({*scene.branch, model_at, own, stability_beside_branch(models, scene, options), motion.cycle,
+                      steps_along_branch(scene.cycle, motion.cycle), tolerance, options.equilibrium,
+                      options.cycle.shooting});
 }
 
 Sensitivity run_sensitivity(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options)

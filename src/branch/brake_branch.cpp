@@ -1,11 +1,13 @@
 #include "squeal/branch/brake_branch.hpp"
 
-#include "reduced_family.hpp"
-
-#include "squeal/algebra/dense_matrix.hpp"
-#include "squeal/base/run_control.hpp"
+#include "squeal/base/cost.hpp"
+#include "squeal/cycle/floquet.hpp"
+#include "squeal/cycle/preconditioner.hpp"
+#include "squeal/scene/numbers.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <memory>
 
 namespace squeal
 {
@@ -13,22 +15,189 @@ namespace squeal
 namespace
 {
 
+/// Adds the counts of a period, from the statuses of the pairs at its steps.
+void count_statuses(const std::vector<std::vector<ContactStatus>>& statuses, PointMeasures& measures)
+{
+  const std::size_t steps = statuses.size(), pairs = steps > 0 ? statuses.front().size() : 0;
+  for (std::size_t pair = 0; pair < pairs; ++pair)
+  {
+    int open = 0, lift_offs = 0;
+    for (std::size_t step = 0; step < steps; ++step)
+    {
+      const ContactStatus now = statuses[step][pair], before = statuses[step > 0 ? step - 1 : steps - 1][pair];
+      measures.stick_steps += now == ContactStatus::stick;
+      open += now == ContactStatus::open;
+      lift_offs += now == ContactStatus::open && before != ContactStatus::open;
+    }
+    if (lift_offs == 0) continue; // open or closed throughout
+    measures.open_steps += open;
+    measures.lift_offs += lift_offs;
+  }
+}
+
+/// The brake at a value of the parameter.
+struct BrakeAt
+{
+  BrakeAt(double value, BrakeModel made, const BrakeBranchProblem& branch)
+      : parameter(value), model(std::move(made)),
+        problem(at_equilibrium(branch.own, {model.structure, model.interface, equilibrium})),
+        map{problem.sliding, branch.own.step, branch.steps_per_period, branch.cycle.theta}, flow(flow_of(map))
+  {
+    add_slow_motions(problem, map, steps_to_compare(model.structure, map.steps), flow);
+  }
+
+  double parameter;
+  BrakeModel model;
+  Equilibrium equilibrium{};
+  bool equilibrium_known = false;
+  CycleProblem problem; // with the modes of the scene's own value
+  std::shared_ptr<const ReducedModel> recorded{};
+  PeriodMap map;
+  Flow flow; // of the map
+};
+
+/// The period maps of a brake at the values of a parameter, as a family of flows.
+class BrakeFamily
+{
+public:
+  explicit BrakeFamily(const BrakeBranchProblem& problem)
+      : problem_(problem), friction_(problem.settings.key == friction_coefficient_key)
+  {
+    set_parameter(problem.settings.own);
+    at_->map.reactions = problem.own.sliding.equilibrium.reactions;
+  }
+
+  /// Borrows the object.
+  FlowFamily flows()
+  {
+    FlowFamily family;
+    family.flow.M = problem_.own.sliding.structure.M;
+    family.flow.K = problem_.own.sliding.structure.K;
+    family.flow.work = at_->flow.work;
+    family.flow.integrate = [this](double period, Vec start, Vec end, Vec rate)
+    { at_->flow.integrate(period, start, end, rate); };
+    family.flow.record_period = [this](double period, Vec start, const TimeGrid& grid)
+    { at_->flow.record_period(period, start, grid); };
+    family.flow.apply_tangent = [this](std::span<const Vec> states) { at_->flow.apply_tangent(states); };
+    family.flow.slow_motions = [this](double period, Vec start)
+    {
+      (void)equilibrium();
+      return at_->flow.slow_motions(period, start);
+    };
+    if (at_->flow.offsets.motion)
+    {
+      family.flow.offsets.motion = [this] { return at_->flow.offsets.motion(); };
+      family.flow.offsets.find_rest = [this](Vec rest) { at_->flow.offsets.find_rest(rest); };
+      family.flow.offsets.without_held = [this](Vec part) { at_->flow.offsets.without_held(part); };
+    }
+    family.set_parameter = [this](double parameter) { set_parameter(parameter); };
+    family.rest = [this] { return rest(); };
+    family.parameter_column = [this](double period, Vec start, Vec column) { parameter_column(period, start, column); };
+    family.measure = [this](const Orbit& orbit) { return measure(orbit); };
+    if (whole_tangent_is_cheap(2. * dofs_of(problem_.cycle.orbit.state))) return family;
+    family.preconditioner = [this](double period, Vec x, Vec y) { apply(inverse_, period, x, y); };
+    family.renew_preconditioner = [this]
+    {
+      (void)equilibrium();
+      at_->problem.reduced = nullptr;
+      inverse_ = [at = at_, by_record = recorded_preconditioner(at_->problem, at_->map, at_->recorded)](
+                     double period, Vec x, Vec y) { by_record(period, x, y); };
+    };
+    return family;
+  }
+
+private:
+  void set_parameter(double parameter)
+  {
+    if (at_ && at_->parameter == parameter) return;
+    if (at_ && friction_) // A and W do not depend on it
+    {
+      at_->parameter = parameter;
+      at_->model.interface.friction.common.coefficient = parameter;
+      at_->map.recorded_start = {}; // what is recorded belongs to the other friction
+      at_->problem.reduced = nullptr;
+      at_->equilibrium_known = false;
+      return;
+    }
+    auto next = std::make_shared<BrakeAt>(parameter, problem_.model_at(parameter), problem_);
+    if (at_) next->map.reactions = at_->map.reactions;
+    at_ = std::move(next);
+  }
+
+  /// Of the value set last.
+  const Equilibrium& equilibrium()
+  {
+    BrakeAt& at = *at_;
+    if (!at.equilibrium_known)
+      at.equilibrium = Equilibria(problem_.equilibrium_options).at(at.model.structure, at.model.interface);
+    at.equilibrium_known = true;
+    return at.equilibrium;
+  }
+
+  /// Where there is no equilibrium its displacements are zero: a reference for the fluctuation none the less.
+  Owned<Vec> rest()
+  {
+    const Owned<Vec> at_rest = zeros_like(problem_.own.sliding.structure.load);
+    return state_of(equilibrium().u, at_rest);
+  }
+
+  /// column = dPhi_period(start)/dparameter: exact by friction, else by a central difference.
+  void parameter_column(double period, Vec start, Vec column)
+  {
+    if (!friction_) return difference_column(period, start, column);
+    at_->flow.record_period(period, start, {});
+    const Vec load = at_->model.structure.load;
+    TangentColumn change{zeros_like(load), zeros_like(load), 0, 1};
+    PeriodMap& map = at_->map;
+    advance_tangents(map.step, map.sliding.structure, map.sliding.interface, map.records, std::span(&change, 1));
+    check(VecCopy(change.u, displacement(column)));
+    check(VecCopy(change.v, velocity(column)));
+  }
+
+  void difference_column(double period, Vec start, Vec column)
+  {
+    // 1e-5 of the range: the contact's tolerance of 1e-10 is then below 1e-4 of the quotient
+    const double parameter = at_->parameter, change = 1e-5 * std::abs(problem_.settings.to - problem_.settings.from);
+    const Owned<Vec> below = zeros_like(column);
+    set_parameter(parameter + change);
+    at_->flow.integrate(period, start, column, nullptr);
+    set_parameter(parameter - change);
+    at_->flow.integrate(period, start, below, nullptr);
+    set_parameter(parameter);
+    check(VecAXPBY(column, -0.5 / change, 0.5 / change, below));
+  }
+
+  PointMeasures measure(const Orbit& orbit)
+  {
+    (void)equilibrium(); // energies refer to it
+    MeasuredPeriod measured = measure_period(at_->map, {problem_.own.probes, 0}, orbit.period, orbit.state, nullptr);
+    PointMeasures measures{measured.mean_energy, measured.mean_fluctuating_energy, std::move(measured.peak_to_peak),
+                           measured.open_pairs_mean};
+    count_statuses(measured.statuses, measures);
+    measures.slips_nonlinearly = depends_on_speed(at_->model.interface.friction);
+    return measures;
+  }
+
+  const BrakeBranchProblem& problem_;
+  bool friction_; // the parameter is the friction coefficient
+  std::shared_ptr<BrakeAt> at_{};
+  Preconditioner inverse_{}; // of the period at which the Jacobian was formed last; holds its brake
+};
+
 /// Whether a side ended where the branch ends, and not where the method does.
 bool natural(BranchEnding ending)
 {
   return ending != BranchEnding::step_too_small && ending != BranchEnding::number_of_points;
 }
 
-Outcome outcome_of(const BrakeBranchProblem& problem, const BrakeBranch& found)
+Outcome outcome_of(const BrakeBranchProblem& problem, const Branch& branch)
 {
-  const Branch& branch = found.branch;
   Outcome outcome{OutcomeKind::converged, "", static_cast<int>(branch.points.size()), 0};
   if (branch.points.empty())
   {
     outcome.kind = OutcomeKind::not_converged;
-    outcome.reason = format("the cycle to start from does not close within %.0e at %d steps a period%s",
-                            problem.tolerance, problem.steps_per_period,
-                            found.reduction ? " on the reduced model: fidelity = \"full\" does without" : "");
+    outcome.reason = format("the cycle to start from does not close within %.0e at %d steps a period",
+                            problem.tolerance, problem.steps_per_period);
     return outcome;
   }
   for (const BranchPoint& point : branch.points) outcome.residual = std::max(outcome.residual, point.residual);
@@ -51,161 +220,7 @@ Outcome outcome_of(const BrakeBranchProblem& problem, const BrakeBranch& found)
   };
   note(branch.ends.backward, branch.points.front());
   note(branch.ends.forward, branch.points.back());
-  if (found.reduction && found.reduction->missed_pairs > 0)
-  {
-    outcome.kind = OutcomeKind::not_converged;
-    outcome.reason += (outcome.reason.empty() ? "" : "; ") +
-                      format("%d pairs of the full model do what the reduced one leaves out: fidelity = \"full\"",
-                             found.reduction->missed_pairs);
-  }
   return outcome;
-}
-
-/// Whether so many shapes are worth a model of their own. A step of a dense model reads a few of its square matrices,
-/// and one of the full model its factor, which has a few dozen entries a column: at an eighth of the size both take as
-/// long, and the derivatives of the dense one still cost far less.
-bool is_far_smaller(const BrakeBranchProblem& problem, std::size_t shapes)
-{
-  constexpr std::size_t times = 8;
-  PetscInt dofs = 0;
-  check(VecGetSize(problem.sliding.structure.load, &dofs));
-  return times * shapes <= static_cast<std::size_t>(dofs);
-}
-
-/// A point of rank 0's branch.
-struct ReducedPoint
-{
-  double parameter = 0, period = 0;
-  Eigen::VectorXd state; // (q, v)
-};
-
-/// Those of rank 0 on every rank. Collective.
-std::vector<ReducedPoint> points_of_first_rank(const Branch& branch, MPI_Comm comm)
-{
-  int count = static_cast<int>(branch.points.size());
-  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
-  std::vector<ReducedPoint> points(static_cast<std::size_t>(count));
-  for (std::size_t i = 0; i < points.size(); ++i)
-  {
-    Eigen::VectorXd all(2);
-    if (i < branch.points.size())
-    {
-      const BranchPoint& point = branch.points[i];
-      const Eigen::VectorXd state = own_coordinates().of(point.state);
-      all.resize(state.size() + 2);
-      all << point.parameter, point.period, state;
-    }
-    broadcast(all, comm);
-    points[i] = {all[0], all[1], all.tail(all.size() - 2)};
-  }
-  return points;
-}
-
-/// One period of the full model from every point: its residual, and what its pairs do.
-void check_on_full_model(BrakeFamily& full, const ReducedFamily& reduced, Branch& branch, PairsSeen& seen)
-{
-  const Flow flow = full.flows().flow;
-  const MPI_Comm comm = comm_of(full.sliding().structure.load);
-  const std::vector<ReducedPoint> points = points_of_first_rank(branch, comm);
-  Progress progress(comm, "branch, full model", static_cast<double>(points.size()));
-  for (std::size_t i = 0; i < points.size(); ++i)
-  {
-    full.set_parameter(points[i].parameter);
-    const Owned<Vec> start = reduced.lifted(points[i].state), moved = full.rest();
-    full.start_from_rest();
-    const MeasuredPeriod measured = full.measured_period(points[i].period, start);
-    const Owned<Vec> defect = state_of(measured.end.u, measured.end.v);
-    check(VecAXPY(defect, -1, start));
-    check(VecAYPX(moved, -1, start));
-    const double residual = energy_norm(flow, defect) / energy_norm(flow, moved);
-    if (i < branch.points.size()) branch.points[i].full_residual = residual;
-    for (const std::vector<ContactStatus>& statuses : measured.statuses)
-      for (std::size_t pair = 0; pair < statuses.size(); ++pair) seen.add(pair, statuses[pair]);
-    progress.update(static_cast<double>(i + 1), format("residual %.1e", residual));
-  }
-}
-
-/// The branch of a reduced model, which every rank follows by itself. Collective.
-Branch trace_by_itself(ReducedFamily& reduced, const BrakeBranchProblem& problem,
-                       const ContinuationSettings& continuation)
-{
-  const MPI_Comm comm = comm_of(problem.sliding.structure.load);
-  const Orbit start = reduced.reduced(problem.cycle.orbit);
-  Branch branch;
-  int asked = 0;
-  try
-  {
-    branch = trace_branch(reduced.flows(), continuation, problem.shooting, start, problem.settings.own);
-  }
-  catch (const Interrupted&)
-  {
-    asked = 1;
-  }
-  MPI_Allreduce(MPI_IN_PLACE, &asked, 1, MPI_INT, MPI_MAX, comm);
-  do join_parts(comm); // throws where rank 0 knows as well
-  while (asked != 0);  // its clock may be a little behind
-  return branch;
-}
-
-/// Follows the branch on a reduced model, again while the full one's pairs do what it leaves out.
-void trace_on_reduced_model(BrakeFamily& full, const BrakeBranchProblem& problem,
-                            const ContinuationSettings& continuation, BrakeBranch& found)
-{
-  constexpr double margin = 2; // a branch reaches further than the cycle that it starts from
-  constexpr int rounds = 4;
-  const MPI_Comm comm = comm_of(problem.sliding.structure.load);
-  PairsSeen seen = pairs_seen_in(problem, margin);
-  for (int round = 1;; ++round)
-  {
-    ReducedFamily reduced(full, problem, seen);
-    end_if_asked(comm);
-    found.branch = trace_by_itself(reduced, problem, continuation);
-    check_on_full_model(full, reduced, found.branch, seen);
-    const auto active = seen.roles({}).active.size(), had = reduced.model().active.size();
-    found.reduction = {reduced.model().size(), static_cast<int>(had), static_cast<int>(active - had),
-                       reduced.interpolation_error()};
-    if (active <= had || round == rounds) return;
-  }
-}
-
-/// Whether a reduced model can stand for the full one: some pairs open or stick, and friction does not change with
-/// speed, which those that slide throughout would have to a first order only.
-bool may_reduce(const BrakeBranchProblem& problem)
-{
-  const PairsSeen seen = pairs_seen_in(problem, 1);
-  const std::size_t active = seen.roles({}).active.size();
-  const PairRows<std::size_t> rows(problem.sliding.interface.directions);
-  return active > 0 && !depends_on_speed(problem.sliding.interface.friction) &&
-         is_far_smaller(problem, 2 * problem.own_modes.size() + rows.rows_of(active));
-}
-
-/// Whether the branch was followed on a reduced model. "auto" goes without one where the range has no equilibria or
-/// modes to make it of, or where its cycle does not close. Where it is asked for, the outcome says why there is none.
-bool try_reduced_model(BrakeFamily& full, const BrakeBranchProblem& problem, const ContinuationSettings& continuation,
-                       BrakeBranch& found)
-{
-  const bool asked = problem.fidelity == CycleModel::reduced;
-  if (!asked && (problem.fidelity == CycleModel::full || !may_reduce(problem))) return false;
-  try
-  {
-    trace_on_reduced_model(full, problem, continuation, found);
-    int followed = found.branch.points.empty() ? 0 : 1;
-    MPI_Bcast(&followed, 1, MPI_INT, 0, comm_of(problem.sliding.structure.load));
-    if (asked || followed != 0) return true;
-    found.not_reduced = "no cycle of the reduced model closes beside the full model's";
-  }
-  catch (const Error& error) // on every rank alike: all of them make the same samples
-  {
-    if (asked)
-    {
-      found.outcome = {OutcomeKind::refused, error.what(), 0, 0};
-      return true;
-    }
-    found.not_reduced = error.what();
-  }
-  found.reduction.reset();
-  full.set_parameter(problem.settings.own);
-  return false;
 }
 
 } // namespace
@@ -232,11 +247,9 @@ BrakeBranch find_branch(const BrakeBranchProblem& problem)
   BrakeFamily family(problem);
   BrakeBranch found;
   found.equilibria = problem.stability.equilibria;
-  if (!try_reduced_model(family, problem, continuation, found))
-    found.branch =
-        trace_branch(family.flows(), continuation, problem.shooting, problem.cycle.orbit, problem.settings.own);
-  if (found.outcome.kind == OutcomeKind::refused) return found;
-  found.outcome = outcome_of(problem, found);
+  found.branch =
+      trace_branch(family.flows(), continuation, problem.shooting, problem.cycle.orbit, problem.settings.own);
+  found.outcome = outcome_of(problem, found.branch);
   const std::vector<BranchEvent>& hopf = problem.stability.hopf;
   found.branch.events.insert(found.branch.events.begin(), hopf.begin(), hopf.end());
   return found;

@@ -13,9 +13,9 @@ constexpr int most_iterations = 12, most_secants = 120;
 constexpr double good_reduction = 0.3; // of the residual by a step: a worse one calls for a new Jacobian
 
 // The map of a period jumps where an event of contact meets the grid of time: an orbit there closes on neither side,
-// and exact steps alternate between both. The same orbit begun a part of a step later has the event elsewhere.
-constexpr double no_reduction = 0.9; // of the residual by an exact step; those of a jump leave 0.95 and more
-constexpr int steps_without_reduction = 2, most_moves = 3;
+// and steps alternate between both. The same orbit begun a part of a step later has the event elsewhere.
+constexpr double progress = 0.9; // of the least residual so far
+constexpr int steps_without_progress = 4, most_moves = 3;
 constexpr double moved_by = 0.3; // of a step of the grid: three moves try four places of the event in it
 
 // Where none of them helps, the better side of the jump is taken, up to so many times the tolerance: its residual is
@@ -45,7 +45,7 @@ void form_jacobian(BranchCorrector& corrector, const Orbit& orbit)
   if (!corrector.parameter_column.get()) corrector.parameter_column = zeros_like(orbit.state);
   corrector.family.parameter_column(orbit.period, orbit.state, corrector.parameter_column);
   corrector.family.flow.record_period(orbit.period, orbit.state, {});
-  if (corrector.family.renew_preconditioner) corrector.family.renew_preconditioner(orbit.period, orbit.state);
+  if (corrector.family.renew_preconditioner) corrector.family.renew_preconditioner();
   corrector.log.convergence.periods += 2;
 }
 
@@ -87,21 +87,25 @@ std::optional<CorrectedOrbit> correct(BranchCorrector& corrector, const Bordered
   Orbit orbit = evaluate_at(z);
   const double first_residual = orbit.residual;
   bool renew = corrector.secants.empty();
-  int without_reduction = 0, moves = 0, corrections = 0;
-  std::optional<CorrectedOrbit> best; // beside a jump
+  int since_progress = 0, moves = 0, corrections = 0;
+  double least = std::numeric_limits<double>::infinity();
+  std::optional<CorrectedOrbit> best;
   for (int iteration = 0; iteration <= most_iterations; ++iteration)
   {
     if (!makes_progress(corrector, orbit, first_residual)) break;
     record_full(corrector.log, ShootingStage::multisecant, orbit);
     if (orbit.residual <= problem.tolerance) return CorrectedOrbit{std::move(orbit), z.parameter, corrections};
-    if (without_reduction > 0 && !(best && best->orbit.residual <= orbit.residual))
+    if (!(best && best->orbit.residual <= orbit.residual))
       best = CorrectedOrbit{copy_of(orbit), z.parameter, corrections};
-    if (without_reduction == steps_without_reduction && corrector.settings.steps > 0)
+    since_progress = orbit.residual < progress * least ? 0 : since_progress + 1;
+    least = std::min(least, orbit.residual);
+    if (since_progress == steps_without_progress && corrector.settings.steps > 0)
     {
       if (moves == most_moves) break;
       check(VecAXPY(z.state, moved_by * z.period / corrector.settings.steps, orbit.rate));
       orbit = evaluate_at(z);
-      without_reduction = 0;
+      since_progress = 0;
+      least = std::numeric_limits<double>::infinity();
       renew = true;
       ++moves;
       iteration = -1; // as many again
@@ -117,14 +121,11 @@ std::optional<CorrectedOrbit> correct(BranchCorrector& corrector, const Bordered
         renew ? exact_step(corrector, system, orbit, std::move(wanted), 0.03)
               : step_by_secants(system, corrector.secants, corrector.options.secant_drop, std::move(wanted));
     const double length = std::sqrt(scaled_product(corrector, step, step));
-    const bool clamped = length > corrector.options.clamp;
-    if (clamped) scale(corrector.options.clamp / length, step);
+    if (length > corrector.options.clamp) scale(corrector.options.clamp / length, step);
     add(1, step, z);
     ++corrections;
     if (!admissible_period(problem, z.period)) break;
     Orbit next = evaluate_at(z);
-    const bool exact = renew && !clamped;
-    without_reduction = exact && next.residual > no_reduction * orbit.residual ? without_reduction + 1 : 0;
     renew = next.residual > good_reduction * orbit.residual;
     Owned<Vec> change = preconditioned(problem, next.period, next.defect);
     check(VecAXPY(change, -1, defect));

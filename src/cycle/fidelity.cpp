@@ -1,7 +1,7 @@
 #include "squeal/cycle/fidelity.hpp"
 
-#include "preconditioner.hpp"
 #include "reduced_cycle.hpp"
+#include "squeal/cycle/preconditioner.hpp"
 #include "step_refinement.hpp"
 
 #include <algorithm>

@@ -1,12 +1,12 @@
-#include "floquet.hpp"
+#include "squeal/cycle/floquet.hpp"
 
-#include "preconditioner.hpp"
+#include "reduced_flow.hpp"
+#include "reduced_spectrum.hpp"
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/cost.hpp"
 #include "squeal/base/free_memory.hpp"
-#include "squeal/cycle/reduced_flow.hpp"
-#include "squeal/cycle/reduced_spectrum.hpp"
+#include "squeal/cycle/preconditioner.hpp"
 
 #include <algorithm>
 #include <cmath>

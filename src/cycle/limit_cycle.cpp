@@ -1,8 +1,8 @@
 #include "squeal/cycle/limit_cycle.hpp"
 
-#include "floquet.hpp"
 #include "offset_spread.hpp"
-#include "preconditioner.hpp"
+#include "squeal/cycle/floquet.hpp"
+#include "squeal/cycle/preconditioner.hpp"
 
 #include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
@@ -87,6 +87,12 @@ LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& opti
   cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};
   add_remedies(map, cycle.outcome);
   return cycle;
+}
+
+CycleProblem at_equilibrium(const CycleProblem& problem, const SlidingEquilibrium& sliding)
+{
+  return {sliding,          problem.linearised, problem.modes,         problem.unstable,
+          problem.settings, problem.step,       problem.modes_options, problem.probes};
 }
 
 CycleProblem with_settings(CycleProblem problem, const CycleSettings& settings)

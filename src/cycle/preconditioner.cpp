@@ -1,7 +1,7 @@
-#include "preconditioner.hpp"
+#include "squeal/cycle/preconditioner.hpp"
 
-#include "floquet.hpp"
-#include "squeal/cycle/reduced_flow.hpp"
+#include "reduced_flow.hpp"
+#include "squeal/cycle/floquet.hpp"
 
 #include <span>
 

@@ -1,9 +1,9 @@
 #include "reduced_cycle.hpp"
 
-#include "floquet.hpp"
-#include "preconditioner.hpp"
 #include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/cycle/floquet.hpp"
+#include "squeal/cycle/preconditioner.hpp"
 #include "step_refinement.hpp"
 
 #include "squeal/shooting/full_space.hpp"

@@ -1,7 +1,7 @@
 #pragma once
 /// The limit cycle of the reduced model: its active pairs, its free motion, its shooting (src/README.md, section 7.7).
+#include "reduced_flow.hpp"
 #include "squeal/cycle/fidelity.hpp"
-#include "squeal/cycle/reduced_flow.hpp"
 
 namespace squeal
 {

@@ -1,4 +1,4 @@
-#include "squeal/cycle/reduced_flow.hpp"
+#include "reduced_flow.hpp"
 
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/run_control.hpp"

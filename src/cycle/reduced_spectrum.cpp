@@ -1,4 +1,4 @@
-#include "squeal/cycle/reduced_spectrum.hpp"
+#include "reduced_spectrum.hpp"
 
 #include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"

@@ -1,6 +1,6 @@
 #include "step_refinement.hpp"
 
-#include "floquet.hpp"
+#include "squeal/cycle/floquet.hpp"
 
 #include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"

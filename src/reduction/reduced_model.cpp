@@ -88,33 +88,24 @@ Structure viscous(const Structure& structure)
   return result;
 }
 
-/// A model's matrices on its shapes.
-struct OnShapes
-{
-  SlidingBasis basis;
-  Lift left; // what the left shapes have beyond the others
-};
-
 /// Sets M, C and K on the shapes X, tested by the left ones, and G and H of the active pairs' rows B.
-OnShapes set_matrices(ReducedModel& model, const LinearisedPoint& point, MultiVector X, Mat B)
+void set_matrices(ReducedModel& model, const LinearisedPoint& point, MultiVector X, Mat B)
 {
-  OnShapes on{{std::move(X)}, {}};
-  SlidingBasis& basis = on.basis;
+  SlidingBasis basis{std::move(X)};
   set_model(basis, viscous(point.sliding.structure), point.sliding.interface);
-  on.left = lift(basis, point.contact, point.contact.Y);
+  const Lift left = lift(basis, point.contact, point.contact.Y); // what the left shapes have beyond the others
   ProjectedSliding projected = project(basis, point);
   model.M = std::move(projected.M);
   model.C = std::move(projected.C);
   model.K = std::move(projected.K);
-  if (model.M_z.size() == 0) model.M_z = basis.M.products; // else it is the basis' own
   model.K_z = basis.K.products;
   if (basis.rayleigh)
     model.C_z = basis.rayleigh->of_mass * model.M_z + basis.rayleigh->of_stiffness * model.K_z;
   else
     model.C_z = basis.C.products;
   model.G = whole_product(B, basis.T);
-  model.H = (model.G + whole_product(at_pivots(B, point.contact), on.left.change)).transpose();
-  return on;
+  model.H = (model.G + whole_product(at_pivots(B, point.contact), left.change)).transpose();
+  model.shapes = std::move(basis.T);
 }
 
 /// E = Z'(K + omega^2 M)Z, bordered by P.
@@ -178,17 +169,16 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   model.omega = omega;
   MultiVector X;
   {
-    const ModeColumns of_modes = mode_columns(modes, reduction, contact);
+    const MultiVector shapes = mode_columns(modes, reduction, contact);
     const Owned<Mat> P = force_rows(forces, BZ);
     const Factor factor = energy_factor(K, structure.M, omega, contact.Z, P, reduction.factor);
-    const MultiVector& shapes = of_modes.columns;
     const MatrixXd energy =
         symmetric_inner_products(shapes, K) + omega * omega * symmetric_inner_products(shapes, structure.M);
-    X = make_basis(model, {factor, contact.Z, P}, of_modes, energy, forces.transpose() * whole_product(B, shapes),
+    X = make_basis(model, {factor, contact.Z, P}, shapes, energy, forces.transpose() * whole_product(B, shapes),
                    structure.M, limits_of(reduction, structure, shapes.columns()));
   }
   // Projected on the basis itself: a combination of what nearly parallel columns give would hold rounding alone.
-  model.shapes = std::move(set_matrices(model, point, std::move(X), B).basis.T);
+  set_matrices(model, point, std::move(X), B);
   model.H = (model.H * forces).eval();
   if (reduction.sliding) model.G = normal_rows(model.G, interface.directions);
   model.E_factor.compute(model.K_z + omega * omega * model.M_z);
@@ -202,57 +192,6 @@ ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<Complex
   set_active_pairs(model, interface, equilibrium, reduction.sliding);
   model.force = -model.H * VectorXd::Map(model.reactions.data(), model.H.cols());
   return model;
-}
-
-namespace
-{
-
-/// What is not in balance at (u0, r0) of `about` in the brake `other`, but for the active pairs: its load, less the
-/// structure's forces, and the springs of the pairs that slide, with friction.
-Owned<Vec> unbalanced_force(const SlidingEquilibrium& about, const SlidingEquilibrium& other, const PairRoles& roles)
-{
-  const Interface& interface = other.interface;
-  Owned<Vec> unbalanced = zeros_like(other.structure.load);
-  check(MatMult(other.structure.K, about.equilibrium.u, unbalanced));
-  check(VecAYPX(unbalanced, -1, other.structure.load));
-  std::vector<double> reactions(interface.size(), 0.); // of springs as long as at u0
-  const PairView still(about.equilibrium.reactions, interface.directions);
-  const PairView<double> springs(reactions, interface.directions);
-  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
-  const TangentView e(directions, interface.directions);
-  for (std::size_t i = 0; i < mu.size(); ++i)
-  {
-    if (!roles.sliding[i] || compliance_of(interface, i) == 0) continue;
-    const double force = still.normal(i) * compliance_of(about.interface, i) / compliance_of(interface, i);
-    springs.normal(i) = force;
-    for (std::size_t k = 0; k < e.of(i).size(); ++k) springs.tangential(i)[k] = mu[i] * force * e.of(i)[k];
-  }
-  add_reactions(interface, reactions, unbalanced);
-  return unbalanced;
-}
-
-} // namespace
-
-ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibrium& about,
-                                const SlidingEquilibrium& other, const PairRoles& roles)
-{
-  const LinearisedPoint point =
-      without_sliding_pairs(other, {roles.sliding, roles.sliding, other.equilibrium.reactions});
-  ReducedModel result;
-  const auto [basis, left] =
-      set_matrices(result, point, model.shapes, rows_of(other.interface, model.active, RowsTaken::all));
-  result.active = model.active;
-  result.of_left_out = model.of_left_out;
-  set_active_pairs(result, other.interface, about.equilibrium, false);
-  result.gap = model.gap;
-  result.omega = model.omega;
-  result.slow = model.slow;
-  const Owned<Vec> force = unbalanced_force(about, other, roles);
-  const MultiVector unbalanced = columns_of(std::array{force.get()});
-  result.force = (inner_products(model.shapes, unbalanced) +
-                  inner_products(left.change, {unbalanced.comm, unbalanced.entries(left.pivots, Eigen::all)}))
-                     .col(0);
-  return result;
 }
 
 ReducedState coordinates(const ReducedModel& model, const Structure& structure, Vec du, Vec v)

@@ -147,7 +147,7 @@ double highest_frequency(const std::vector<ComplexMode>& modes)
   return highest;
 }
 
-ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction,
+MultiVector mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction,
                          const ClosedContact& contact)
 {
   const double omega = modes.front().lambda.imag();
@@ -164,8 +164,7 @@ ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction&
   for (const ModeShape& shape : shapes_above(reduction.real, modes)) shapes.push_back(shape);
   std::vector<Vec> columns;
   for (const ModeShape& shape : shapes) columns.push_back(shape.shape);
-  columns.insert(columns.end(), reduction.more.begin(), reduction.more.end());
-  return {product(contact.Z, kept_rows(columns_of(columns), contact)), static_cast<Index>(reduction.more.size())};
+  return product(contact.Z, kept_rows(columns_of(columns), contact));
 }
 
 Eigen::SparseMatrix<double> sliding_forces(const Interface& interface, const std::vector<int>& active)
@@ -204,16 +203,14 @@ Owned<Mat> force_rows(const Eigen::SparseMatrix<double>& forces, Mat BZ)
   return P;
 }
 
-MultiVector make_basis(ReducedModel& model, const Attachments& attachments, const ModeColumns& modes,
+MultiVector make_basis(ReducedModel& model, const Attachments& attachments, const MultiVector& modes,
                        const MatrixXd& energy_of_modes, const MatrixXd& of_modes, Mat M, const AttachmentLimits& limits)
 {
-  constexpr double new_shape = 1e-3; // part of further shapes that must be new
-  const Index modal = modes.columns.columns(), count = of_modes.rows();
+  const Index modal = modes.columns(), count = of_modes.rows();
   const MatrixXd energy = energies(attachments, energy_of_modes, of_modes);
   Orthonormal basis{energy, MatrixXd(energy.rows(), 0)};
   extend(basis, 2, 1e-7); // the followed mode is kept whatever else is
-  extend(basis, modal - modes.more - 2, 1e-6);
-  extend(basis, modes.more, new_shape);
+  extend(basis, modal - 2, 1e-6);
   const Index of_modes_alone = basis.T.cols();
   const Extension attached = extend(basis, count, limits.threshold, limits.at_most);
   if (attached.lost > limits.most_lost)
@@ -235,15 +232,14 @@ MultiVector make_basis(ReducedModel& model, const Attachments& attachments, cons
 
   // The basis is solved for, not combined from attachments: these would have to be held, those left out as well.
   const auto of_shapes = basis.T.topRows(modal);
-  MultiVector X{modes.columns.comm, MatrixXd(modes.columns.entries.rows(), basis.T.cols())};
-  X.entries.leftCols(of_modes_alone).noalias() = modes.columns.entries * of_shapes.leftCols(of_modes_alone);
+  MultiVector X{modes.comm, MatrixXd(modes.entries.rows(), basis.T.cols())};
+  X.entries.leftCols(of_modes_alone).noalias() = modes.entries * of_shapes.leftCols(of_modes_alone);
   solve_attachments(attachments, basis.T.bottomRightCorner(count, attached.taken),
                     [&](Index first, const MultiVector& shapes)
                     {
                       const Index at = of_modes_alone + first, some = shapes.columns();
                       X.entries.middleCols(at, some) = product(attachments.Z, shapes).entries;
-                      X.entries.middleCols(at, some).noalias() +=
-                          modes.columns.entries * of_shapes.middleCols(at, some);
+                      X.entries.middleCols(at, some).noalias() += modes.entries * of_shapes.middleCols(at, some);
                     });
   const MatrixXd mass = symmetric_inner_products(X, M), turn = by_falling_period(mass, model.omega, model.slow);
   model.M_z = turn.transpose() * mass * turn;

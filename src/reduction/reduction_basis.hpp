@@ -10,16 +10,9 @@
 namespace squeal
 {
 
-/// Shapes of modes, then further ones.
-struct ModeColumns
-{
-  MultiVector columns;
-  Eigen::Index more = 0; // number of further shapes
-};
-
 /// The followed mode is the first; the others nearest to it in frequency. Real and imaginary parts. Then real modes.
 /// All as motions Z y that keep the eliminated pairs closed.
-ModeColumns mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction,
+MultiVector mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction,
                          const ClosedContact& contact);
 
 /// The force of each active pair that slides, one column each: its normal force and the friction that follows it, on
@@ -48,7 +41,7 @@ struct AttachmentLimits
 /// the modes X; `of_modes`: F'B X. Sets the model's counts, what it leaves out (its compliance by forces), M_z and
 /// `slow`. Energies of attachments are the condensed operator P E^-1 P', so that only those which the basis takes
 /// are solved for. Error: more compliance would be lost than may be.
-MultiVector make_basis(ReducedModel& model, const Attachments& attachments, const ModeColumns& modes,
+MultiVector make_basis(ReducedModel& model, const Attachments& attachments, const MultiVector& modes,
                        const Eigen::MatrixXd& energy_of_modes, const Eigen::MatrixXd& of_modes, Mat M,
                        const AttachmentLimits& limits);
 

@@ -24,15 +24,6 @@ void add_peak(Entry out, const std::string& excitation, const std::string& probe
   out.brief("receptance", "m/N", "displacement over force there", has_peak ? std::abs(*peak) : 0);
 }
 
-void add_reduction(Entry out, const BranchReduction& reduction)
-{
-  out.show("shapes", "-", "shapes of the reduced model", reduction.shapes);
-  out.show("active_pairs", "-", "pairs that keep their contact in it", reduction.active_pairs);
-  out.show("missed_pairs", "-", "further pairs that open or stick in the full model's periods", reduction.missed_pairs);
-  out.show("interpolation_error", "-", "error of its matrices between the values sampled",
-           reduction.interpolation_error);
-}
-
 void add_branch_point(Entry out, const BranchPoint& point)
 {
   const PointMeasures& measures = point.measures;
@@ -42,8 +33,6 @@ void add_branch_point(Entry out, const BranchPoint& point)
   out.add("period", "s", "period of the cycle", point.period);
   out.show("frequency_hz", "Hz", "its frequency", 1 / point.period);
   out.add("residual", "-", "in the full space: up to ten tolerances where the period's map jumps", point.residual);
-  if (out.has(!std::isnan(point.full_residual)))
-    out.add("full_residual", "-", "what a period of the full model misses a reduced cycle by", point.full_residual);
   out.add("mean_energy", "J", "mean mechanical energy", measures.mean_energy);
   out.show("mean_fluctuating_energy", "J", "mean energy about equilibrium", measures.mean_fluctuating_energy);
   out.add("open_pairs_mean", "-", "mean number of open pairs", measures.open_pairs_mean);
@@ -193,7 +182,6 @@ void add_branch(Entry out, const Report& report)
   const BrakeBranch& found = report.branch;
   const BranchSettings& settings = *out.scene().branch;
   const Branch& branch = found.branch;
-  const BranchReduction none{};
   add_key(out, "number that changes along the branch", settings.key);
   out.brief("from", "unit of the key", "one end of its range", settings.from);
   out.brief("to", "unit of the key", "the other end", settings.to);
@@ -202,10 +190,6 @@ void add_branch(Entry out, const Report& report)
   const Entry ends = out.group("ends");
   ends.show("backward", "why the side towards smaller values ended", branch.ends.backward);
   ends.show("forward", "why the side towards larger values ended", branch.ends.forward);
-  out.show("model", "model that the branch was followed on", found.reduction ? CycleModel::reduced : CycleModel::full);
-  out.text("not_reduced", "why `auto` followed the full model after it had tried a reduced one", found.not_reduced);
-  if (out.has(found.reduction.has_value()))
-    add_reduction(out.group("reduction"), found.reduction ? *found.reduction : none);
   out.curve("points", add_branch_point, branch.points);
   out.list("events", add_event, branch.events);
   std::vector<EquilibriumStability> known = found.equilibria;

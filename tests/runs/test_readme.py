@@ -195,8 +195,8 @@ def data_sets_of(file):
 UNLESS_STABLE = {"cycle.multipliers.crossing", "cycle.multipliers.would_decide", "cycle.multipliers.refusal"}
 # Written of points of a sweep that fail.
 UNLESS_STABLE |= {"sweep.points[].reason"}
-# Written of branches with events, and of reduced models, which test_branch reads.
-OF_SOME_BRANCHES = re.compile(r"branch\.(events\[\]\.\w+|reduction\..+|points\[\]\.full_residual|not_reduced)")
+# Written of branches with events, which test_branch reads.
+OF_SOME_BRANCHES = re.compile(r"branch\.events\[\]\.\w+")
 # Written of pairs without a drive, which test_undriven and test_joint_cycles read.
 UNLESS_STABLE |= {f"equilibrium.undriven_pairs.{key}" for key in ("stick", "slip", "open", "at_limit", "increments", "change", "index",
                                                                   "reciprocal_condition")} | {"transient.joint_work[]", "modes.dependent_rows", "estimate.slip_amplitude",

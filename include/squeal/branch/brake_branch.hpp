@@ -6,8 +6,6 @@
 #include "squeal/branch/continuation.hpp"
 #include "squeal/cycle/limit_cycle.hpp"
 
-#include <optional>
-
 namespace squeal
 {
 
@@ -28,14 +26,6 @@ struct SlidingStability
   std::vector<BranchEvent> hopf{};                // where modes become unstable or stable, with the frequency of each
 };
 
-/// What a branch was followed on where that was not the full model.
-struct BranchReduction
-{
-  int shapes = 0, active_pairs = 0;
-  int missed_pairs = 0;           // which the full model's periods saw do what the reduced one leaves out
-  double interpolation_error = 0; // [-] of the matrices between the samples
-};
-
 /// outcome: "converged" (both sides came to a bound, to first lift-off or to a Hopf point), "not converged" (how far
 /// they came), "skipped", "off".
 struct BrakeBranch
@@ -43,8 +33,6 @@ struct BrakeBranch
   Outcome outcome;
   Branch branch;                                // its events include those of the equilibrium
   std::vector<EquilibriumStability> equilibria; // by rising parameter
-  std::optional<BranchReduction> reduction;     // of a branch on a reduced model
-  std::string not_reduced;                      // why none serves a large model, where one was tried
 };
 
 /// The cycle that is followed, the number that changes, and how each point is computed.
@@ -52,19 +40,12 @@ struct BrakeBranchProblem
 {
   const BranchSettings& settings;
   std::function<BrakeModel(double parameter)> model_at; // with matrices of the layout of the scene's own
-  SlidingEquilibrium sliding;                           // of the scene itself
+  CycleProblem own;                                     // of the scene itself
   SlidingStability stability;                           // along the range
   const LimitCycle& cycle;                              // where the branch starts
-  const std::vector<ComplexMode>& own_modes;            // of the scene
-  const ComplexMode& followed;                          // of these, by the cycle
-  CycleModel fidelity = CycleModel::full;               // automatic: reduced where that is far smaller
   int steps_per_period = 0;
   double tolerance = 0; // on the full-space residual
-  Mat probes = nullptr;
-  const ModesSettings& modes;
-  const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;
-  const StepOptions& step;
   const ShootingOptions& shooting;
 };
 

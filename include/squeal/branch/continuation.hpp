@@ -35,8 +35,7 @@ struct FlowFamily
   std::function<void(double period, Vec start, Vec column)> parameter_column;
   std::function<PointMeasures(const Orbit& orbit)> measure{}; // at the value set last; may be empty
   Preconditioner preconditioner{};
-  /// Makes the preconditioner that of this period. Empty: there is but one.
-  std::function<void(double period, Vec start)> renew_preconditioner{};
+  std::function<void()> renew_preconditioner{}; // makes it that of the period recorded last; empty: there is but one
 };
 
 /// A closed orbit of the branch.
@@ -48,7 +47,6 @@ struct BranchPoint
   double fluctuation = 0;          // |x - rest| in the energy norm
   Multipliers multipliers;
   PointMeasures measures;
-  double full_residual = std::numeric_limits<double>::quiet_NaN(); // of a reduced model's orbit: on the full one
 };
 
 /// What happens along a branch.

@@ -59,6 +59,9 @@ struct CycleProblem
   const ReducedModel* reduced = nullptr; // whose cycle it starts from
 };
 
+/// The problem of another brake, at its equilibrium.
+CycleProblem at_equilibrium(const CycleProblem& problem, const SlidingEquilibrium& sliding);
+
 /// The problem with other settings.
 CycleProblem with_settings(CycleProblem problem, const CycleSettings& settings);
 

@@ -88,7 +88,6 @@ struct Reduction
   bool sliding = false;                   // the active pairs slide along the drive throughout
   const RealModes* real = nullptr;        // frictionless ones; those above the complex modes are taken, too. Null: none
   FactorOptions factor{};
-  std::span<const Vec> more{}; // further shapes
 };
 
 /// The model whose other closed pairs slide throughout. Collective. Error: as of eliminate_closed_pairs; K + omega^2 M
@@ -119,12 +118,6 @@ struct PairRoles
 /// The same with the roles of all pairs given.
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, const PairRoles& roles,
                     const Reduction& reduction);
-
-/// The same shapes, about the same state, for the brake with another value of a number of its scene. `about`: the
-/// equilibrium that the model was made at; `other`: the other brake, whose own equilibrium turns the friction of C_f.
-/// E_factor and M_factor are not made. The model's friction must be free. Collective.
-ReducedModel on_the_same_shapes(const ReducedModel& model, const SlidingEquilibrium& about,
-                                const SlidingEquilibrium& other, const PairRoles& roles);
 
 /// Position and velocity about the equilibrium.
 struct ReducedState

@@ -1,7 +1,7 @@
 #pragma once
 /// Largest multipliers of a reduced model's monodromy matrix on recorded contact, with right and left vectors
 /// (src/README.md, sections 6.9 and 7.5). The same on every rank.
-#include "squeal/cycle/reduced_flow.hpp"
+#include "reduced_flow.hpp"
 
 #include <complex>
 
