@@ -8,12 +8,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace squeal
 {
 
 namespace
 {
+
+/// Normal reactions over areas [Pa].
+std::vector<double> pressures_of(const Interface& interface, const Equilibrium& equilibrium)
+{
+  std::vector<double> result;
+  const PairView pairs(equilibrium.reactions, equilibrium.directions);
+  for (const ContactPair& pair : interface.geometry)
+    result.push_back(pairs.normal(result.size()) / std::max(pair.area, std::numeric_limits<double>::min()));
+  return result;
+}
 
 /// Takes fields of the scene's mesh to the finer one.
 class Prolongation
@@ -57,16 +68,39 @@ public:
     return result;
   }
 
+  /// Pressures of the scene's mesh at pairs of the finer one [Pa]; NaN where one that they come from is open.
+  std::vector<double> pressures(const Equilibrium& equilibrium) const
+  {
+    std::map<std::size_t, double> closed; // by nodes
+    const std::vector<double> own = pressures_of(coarse_.interface, equilibrium);
+    for (std::size_t i = 0; i < own.size(); ++i)
+      if (equilibrium.closed[i]) closed[static_cast<std::size_t>(coarse_.interface.geometry[i].node)] = own[i];
+    std::vector<double> result;
+    for (const ContactPair& pair : fine_.interface.geometry)
+      result.push_back(sum_over_parents(static_cast<std::size_t>(pair.node),
+                                        [&](std::size_t node)
+                                        {
+                                          const auto found = closed.find(node);
+                                          return found == closed.end() ? std::nan("") : found->second;
+                                        }));
+    return result;
+  }
+
 private:
   /// Component c of a node of the finer mesh.
   double at(std::size_t node, int c, const std::vector<double>& q) const
   {
+    return sum_over_parents(node, [&](std::size_t parent) { return coarse(parent, c, q); });
+  }
+
+  /// A value at a node of the finer mesh from those at nodes of the scene's.
+  double sum_over_parents(std::size_t node, const auto& value) const
+  {
     const std::size_t kept = file_nodes_ - parents_.size();
-    if (node < kept) return coarse(node, c, q);
-    if (node >= file_nodes_) return coarse(node - parents_.size(), c, q);
+    if (node < kept) return value(node);
+    if (node >= file_nodes_) return value(node - parents_.size());
     double sum = 0;
-    for (const auto& [parent, weight] : parents_[node - kept])
-      sum += weight * coarse(static_cast<std::size_t>(parent), c, q);
+    for (const auto& [parent, weight] : parents_[node - kept]) sum += weight * value(static_cast<std::size_t>(parent));
     return sum;
   }
 
@@ -83,43 +117,12 @@ private:
   std::size_t file_nodes_ = 0; // of the finer mesh
 };
 
-/// A part of the finer problem.
-struct FinerProblem
+/// An eigenvalue on the finer mesh.
+struct FinerMode
 {
-  QuadraticProblem matrices;
-  Owned<Mat> K_loss;
-  ShiftInvert pencil;
+  std::complex<double> lambda{};        // [1/s]
+  double backward_error = std::nan(""); // NaN: it was not found
 };
-
-/// The mode that is most like `start`, real and imaginary part, near lambda.
-ModeOnFinerMesh find_finer(FinerProblem& problem, std::complex<double> lambda, const MultiVector& start)
-{
-  constexpr double beside = 1e-4, lowest = 0.7, highest = 1.4; // of the frequency
-  constexpr int passes = 30;
-  constexpr std::size_t pairs = 6; // whichever of them friction mixes
-  const double square = std::norm(lambda);
-  move_to(problem.pencil, (1 + beside) * square);
-  const QuadraticSolution found =
-      solve_on_subspace(problem.matrices, problem.K_loss, start, problem.pencil.factor.get(),
-                        {.window = {lowest * lowest * square, highest * highest * square},
-                         .passes = passes,
-                         .pairs = pairs,
-                         .tolerance = 1e-12,
-                         .sharp = 1e-13});
-  ModeOnFinerMesh result{lambda, {}, std::nan("")};
-  double best = 0;
-  for (const Eigenpair& pair : found.pairs)
-  {
-    const std::array parts{pair.real.get(), pair.imaginary.get()};
-    const Eigen::MatrixXd products = inner_products(columns_of(parts), start);
-    const double like = std::hypot(products(0, 0) + products(1, 1), products(0, 1) - products(1, 0));
-    if (!(like > best) || !(pair.backward_error < 1e-8)) continue;
-    best = like;
-    result.finer = pair.lambda;
-    result.backward_error = pair.backward_error;
-  }
-  return result;
-}
 
 MeshError skipped(const std::string& reason)
 {
@@ -128,28 +131,83 @@ MeshError skipped(const std::string& reason)
   return result;
 }
 
+/// Of each mode the one that is most like it on the finer mesh with these closed pairs.
+std::vector<FinerMode> find_finer(std::span<const ComplexMode* const> modes, const Prolongation& prolong,
+                                  const SlidingEquilibrium& sliding, const PencilOptions& options)
+{
+  constexpr double beside = 1e-4, lowest = 0.7, highest = 1.4; // of the frequency
+  constexpr int passes = 30;
+  constexpr std::size_t pairs = 6; // whichever of them friction mixes
+  const LinearisedSliding linearised = linearise(sliding);
+  const QuadraticProblem problem = sliding_problem(sliding.structure, linearised);
+  const Owned<Mat> K_loss = sliding_loss(sliding.structure, linearised);
+  ShiftInvert pencil = make_shift_invert(linearised.K_z, linearised.M_z, Keep::factor, options);
+  std::vector<FinerMode> result(modes.size());
+  for (std::size_t k = 0; k < modes.size(); ++k)
+  {
+    const Owned<Vec> real = prolong(modes[k]->real), imaginary = prolong(modes[k]->imaginary);
+    const std::array parts{real.get(), imaginary.get()};
+    const MultiVector start = kept_rows(columns_of(parts), linearised.contact);
+    const double square = std::norm(modes[k]->lambda);
+    move_to(pencil, (1 + beside) * square);
+    const QuadraticSolution found = solve_on_subspace(problem, K_loss, start, pencil.factor.get(),
+                                                      {.window = {lowest * lowest * square, highest * highest * square},
+                                                       .passes = passes,
+                                                       .pairs = pairs,
+                                                       .tolerance = 1e-12,
+                                                       .sharp = 1e-13});
+    double best = 0;
+    for (const Eigenpair& pair : found.pairs)
+    {
+      const std::array vector{pair.real.get(), pair.imaginary.get()};
+      const Eigen::MatrixXd products = inner_products(columns_of(vector), start);
+      const double like = std::hypot(products(0, 0) + products(1, 1), products(0, 1) - products(1, 0));
+      if (!(like > best) || !(pair.backward_error < 1e-8)) continue;
+      best = like;
+      result[k] = {pair.lambda, pair.backward_error};
+    }
+  }
+  return result;
+}
+
 MeshError on_finer_model(const SlidingPoint& point, const Model& fine, const ProgramOptions& options)
 {
   MeshError result;
   check(VecGetSize(fine.structure.load, &result.dofs));
   result.outcome = {OutcomeKind::not_converged, "no equilibrium was found on the finer mesh", 0, 0};
-  const Equilibrium equilibrium = find_equilibrium(fine.structure, fine.interface, options.equilibrium);
+  Equilibrium equilibrium = find_equilibrium(fine.structure, fine.interface, options.equilibrium);
   if (equilibrium.outcome.kind != OutcomeKind::converged) return result;
-  const LinearisedSliding linearised = linearise({fine.structure, fine.interface, equilibrium});
-  const ClosedContact& contact = linearised.contact;
-  FinerProblem problem{sliding_problem(fine.structure, linearised), sliding_loss(fine.structure, linearised),
-                       make_shift_invert(linearised.K_z, linearised.M_z, Keep::factor, options.modes.pencil)};
   const Prolongation prolong(*point.model, fine);
   if (!prolong.is_nested()) return skipped("gmsh made another mesh of the geometry the second time");
   result.outcome = {OutcomeKind::converged, "", 0, 0};
+  std::vector<const ComplexMode*> modes;
   const auto asked = std::min(point.modes.modes.size(), static_cast<std::size_t>(point.modes.unstable_count) + 1);
   for (const ComplexMode& mode : std::span(point.modes.modes).first(asked))
+    if (mode.frequency_hz() != 0) modes.push_back(&mode);
+  const SlidingEquilibrium sliding{fine.structure, fine.interface, equilibrium};
+  const std::vector<FinerMode> own = find_finer(modes, prolong, sliding, options.modes.pencil);
+
+  const std::vector<double> before = prolong.pressures(point.equilibrium),
+                            now = pressures_of(fine.interface, equilibrium);
+  std::vector<char> held, staying; // pairs closed on the scene's mesh; where pressures change once more as they did
+  for (std::size_t i = 0; i < now.size(); ++i)
   {
-    if (mode.frequency_hz() == 0) continue;
-    const Owned<Vec> real = prolong(mode.real), imaginary = prolong(mode.imaginary);
-    const std::array parts{real.get(), imaginary.get()};
-    result.modes.push_back(find_finer(problem, mode.lambda, kept_rows(columns_of(parts), contact)));
-    const double error = result.modes.back().backward_error;
+    held.push_back(!std::isnan(before[i]));
+    staying.push_back(equilibrium.closed[i] && 2 * now[i] >= before[i]);
+  }
+  const bool has_moved = held != equilibrium.closed;
+  const std::vector<char>& closed = has_moved ? held : staying;
+  std::vector<FinerMode> others = own;
+  if (closed != equilibrium.closed)
+  {
+    equilibrium.closed = closed;
+    others = find_finer(modes, prolong, sliding, options.modes.pencil);
+  }
+  for (std::size_t k = 0; k < modes.size(); ++k)
+  {
+    const double error = std::isnan(others[k].backward_error) ? others[k].backward_error : own[k].backward_error;
+    const std::complex<double> fine_lambda = own[k].lambda, other = others[k].lambda;
+    result.modes.push_back({modes[k]->lambda, fine_lambda, has_moved ? other : fine_lambda, other, error});
     result.outcome.residual = std::max(result.outcome.residual, error);
     if (!result.modes.back().is_known())
       result.outcome = {OutcomeKind::not_converged, "a mode was not found on the finer mesh", 0, 0};

@@ -68,8 +68,12 @@ void add_mode_error(Entry out, const ModeOnFinerMesh& mode)
   out.show("growth_rate", "1/s", "its growth rate there", mode.lambda.real());
   out.show("finer_frequency_hz", "Hz", "the frequency with every element divided", frequency_hz_of(mode.finer));
   out.show("finer_growth_rate", "1/s", "the growth rate there", mode.finer.real());
+  out.add("held_frequency_hz", "Hz", "that with the closed pairs of the scene's mesh", frequency_hz_of(mode.held));
+  out.add("held_growth_rate", "1/s", "the growth rate with them", mode.held.real());
+  out.add("other_growth_rate", "1/s", "the growth rate with other closed pairs than its own that it may have",
+          mode.other.real());
   out.brief("corrected_frequency_hz", "Hz", "the frequency where both meshes lead", frequency_hz_of(mode.corrected()));
-  out.error("frequency_error", "its bar, for orders of convergence from 1 on", mode.frequency_bar()).is_brief = true;
+  out.error("frequency_error", "its bar", mode.bar().imag() / two_pi).is_brief = true;
   out.brief("corrected_growth_rate", "1/s", "the growth rate where both meshes lead", mode.corrected().real());
   out.error("growth_error", "its bar", mode.growth_bar()).is_brief = true;
   out.show("undecided", "switch", "the bar holds zero growth, or growth of the other sign", mode.is_undecided());

@@ -60,3 +60,17 @@ def test_the_finer_modes_are_those_of_the_finer_mesh(squeal, tmp_path, ranks):
         assert found["mesh_error"]["modes"][0]["finer_frequency_hz"] == pytest.approx(finer[0]["frequency_hz"], rel=1e-8)
     assert found["mesh_error"]["modes"][0]["finer_growth_rate"] == pytest.approx(139.461274, rel=1e-6)
     assert found["mesh_error"]["modes"][0]["undecided"] is False
+
+
+@pytest.mark.parametrize("geometry", ["pin.geo", "pin_tetrahedra.geo"])
+def test_pairs_that_open_on_the_finer_mesh_widen_the_bar(squeal, geometry):
+    """Pairs open at the edge of the pin on the finer mesh alone, and the growth rate jumps. The bar holds 150 1/s, which meshes of twice
+    as many divisions and more come to; held closed, the finer mesh moves the growth rate of the tetrahedra by less than a tenth of that."""
+    scene = INPUTS / "pin_on_disc" / "scene.toml"
+    run = squeal(scene, "--set", f"mesh.file={scene.with_name(geometry)}", "--set", "cycle.enabled=false", "--set", "estimate.enabled=false",
+                 "--set", "modes.band=6000", "--set", "modes.mesh_error=refinement", ranks=1)
+    mode = run.report["modes"]["mesh_error"]["modes"][0]
+    jump, smooth = (abs(mode["finer_growth_rate"] - mode["held_growth_rate"]), abs(mode["held_growth_rate"] - mode["growth_rate"]))
+    assert jump > 10 and mode["growth_error"] == pytest.approx(jump + smooth / 2, rel=1e-9)
+    assert abs(mode["corrected_growth_rate"] - 150) <= mode["growth_error"] < 60
+    assert geometry == "pin.geo" or smooth < 0.1 * jump

@@ -13,11 +13,17 @@ namespace squeal
 struct ModeOnFinerMesh
 {
   std::complex<double> lambda, finer; // [1/s]
-  double backward_error = 0;          // of the finer one; NaN: it was not found
+  std::complex<double> held, other;   // finer ones: with the closed pairs of the scene's mesh; with others than its own
+  double backward_error = 0;          // of the finer ones; NaN: one was not found
 
-  std::complex<double> corrected() const { return finer + (finer - lambda) / 2.; }
-  double growth_bar() const { return std::abs((finer - lambda).real()) / 2; }               // [1/s] of the corrected
-  double frequency_bar() const { return std::abs((finer - lambda).imag()) / (2 * two_pi); } // [Hz]
+  std::complex<double> corrected() const { return finer + (held - lambda) / 2.; }
+  /// Of the corrected one: the real part in growth [1/s], the imaginary part in angular frequency [rad/s].
+  std::complex<double> bar() const
+  {
+    const std::complex<double> smooth = (held - lambda) / 2., contact = finer - other;
+    return {std::abs(smooth.real()) + std::abs(contact.real()), std::abs(smooth.imag()) + std::abs(contact.imag())};
+  }
+  double growth_bar() const { return bar().real(); }
 
   /// Whether the limit may grow where the mode does not, or the other way.
   bool is_undecided() const { return is_known() && (lambda.real() > 0 ? 1 : -1) * corrected().real() <= growth_bar(); }
