@@ -1,6 +1,7 @@
 #pragma once
 /// Numbers of a scene as the members that the scene's keys bind, with messages about those that are not there.
 #include "scene_keys.hpp"
+#include "squeal/base/error.hpp"
 
 namespace squeal
 {
@@ -36,6 +37,19 @@ std::vector<EntryNumbers> entries_of(Scene& scene, Study use);
 /// The value of a number that a table names, such as "[branch]". Throws Error if the key is not that of a number that
 /// the structure, its contact or its loads have.
 double number_at(const Scene& scene, const std::string& key, const std::string& table);
+
+/// Does a check; the text of an Error of it then begins with `prefix`.
+template <class Check> void prefixed(const std::string& prefix, Check check)
+{
+  try
+  {
+    check();
+  }
+  catch (const Error& error)
+  {
+    throw Error(prefix + error.what());
+  }
+}
 
 /// Throws Error, with the place of the member, if the scene is none with this value of the number.
 void need_scene(const Scene& scene, const SceneNumber& number, const std::string& place, const std::string& label);

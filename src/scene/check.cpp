@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <map>
 #include <set>
 
 namespace squeal
@@ -20,7 +21,7 @@ public:
 
   void check_all() const
   {
-    check_source();
+    if (scene_.matrices) check_matrix_scene();
     check_names();
     for (const Support& support : scene_.supports)
       if (support.fixed == Motions{}) fail(&support.fixed, "[[support]] " + support.on + " fixed holds nothing still");
@@ -51,48 +52,23 @@ public:
     if (scene_.response) check_response(*scene_.response);
   }
 
-private:
-  /// Throws Error if a list that excludes another is not empty.
-  template <class T> void refuse(const std::vector<T>& list, const std::string& key, const std::string& why) const
-  {
-    if (!list.empty()) fail(&list.front(), "[[" + key + "]] " + why);
-  }
-
+  /// The structure is of one kind.
   void check_source() const
   {
     const Scene& s = scene_;
     if (s.mesh && s.matrices) fail(&*s.matrices, "[mesh] and [matrices] exclude each other: keep one");
     if (!s.mesh && !s.matrices && s.points.empty())
       throw Error(places_.file + ": the scene has no structure: give [mesh], [matrices] or [[point]]");
-    if (s.matrices) check_matrix_scene();
     if (s.mesh && s.parts.empty())
       fail(&*s.mesh, "a mesh needs at least one [[part]] that gives a named group its material");
-    if (s.mesh || s.matrices) return;
-    refuse(s.parts, "part", "needs a [mesh]");
-    refuse(s.rigid_bodies, "rigid_body", "needs a [mesh] with its surfaces; without one use a [[point]] with a mass");
-    refuse(s.pressures, "pressure", "needs a [mesh] with its surface; without one use a [[force]]");
-    refuse(s.ties, "tie", "needs a [mesh] with its surfaces; without one use a [[spring]]");
   }
 
+private:
   void check_matrix_scene() const
   {
-    const std::string why = "belongs to mesh and point scenes; in a matrix scene the folder's files hold it";
     const Scene& s = scene_;
-    refuse(s.parts, "part", why);
-    refuse(s.points, "point", why);
-    refuse(s.rigid_bodies, "rigid_body", why);
-    refuse(s.couplings, "coupling", why);
-    refuse(s.springs, "spring", why);
-    refuse(s.connectors, "connector", why);
-    refuse(s.beams, "beam", why);
-    refuse(s.masses, "mass", why);
-    refuse(s.bolts, "bolt", why);
-    if (s.gravity != Vec3{}) fail(&s.gravity, "gravity " + why);
-    refuse(s.superelements, "superelement", why);
-    refuse(s.pressures, "pressure", why);
-    refuse(s.contacts, "contact", why);
-    refuse(s.rotors, "rotor", why);
-    refuse(s.ties, "tie", why);
+    if (s.gravity != Vec3{})
+      fail(&s.gravity, "gravity belongs to mesh and point scenes; in a matrix scene the folder's files hold it");
     for (const Support& support : s.supports)
     {
       const bool row = !need_rows(support.on, "[[support]] on").nodes;
@@ -118,30 +94,12 @@ private:
     return *names;
   }
 
-  /// Throws Error if a name was seen before.
-  template <class T>
-  void need_different(const std::vector<T>& list, const std::string& key, std::set<std::string>& seen) const
-  {
-    for (const T& entry : list)
-      if (!seen.insert(entry.name).second)
-        fail(&entry.name, "[[" + key + "]] name = \"" + entry.name + "\" is taken; give another name");
-  }
-
   void check_names() const
   {
-    std::set<std::string> parts, nodes = {ground}, superelements, probes, beams, bolts; // springs refer to the ground
     for (const auto& [name, value] : scene_.numbers)
       if (!std::isalpha(static_cast<unsigned char>(name[0])) ||
           !std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c) || c == '_'; }))
         fail(&scene_.numbers, "[numbers] '" + name + "': a name begins with a letter, and holds letters, digits and _");
-    need_different(scene_.parts, "part", parts);
-    need_different(scene_.points, "point", nodes);
-    need_different(scene_.rigid_bodies, "rigid_body", nodes);
-    need_different(scene_.couplings, "coupling", nodes);
-    need_different(scene_.beams, "beam", beams);
-    need_different(scene_.bolts, "bolt", bolts);
-    need_different(scene_.superelements, "superelement", superelements);
-    need_different(scene_.probes, "probe", probes);
   }
 
   void check_material(const Part& part) const
@@ -401,9 +359,46 @@ private:
 
 } // namespace
 
-void check_scene(const Scene& scene, const Places& places)
+namespace
 {
-  Checker(scene, places).check_all();
+
+/// Throws Error for a table that a scene of its kind has no use for, and for a name that is taken.
+void check_tables(Scene& scene, const Places& places)
+{
+  constexpr std::array of_mesh = {"part", "rigid_body", "pressure", "tie"};
+  constexpr std::array nodes = {"point", "rigid_body", "coupling"};
+  constexpr std::array of_matrices = {"support", "force", "step", "initial", "probe", "change", "uncertain"};
+  const auto is_in = [](const auto& tables, const std::string& table)
+  { return std::ranges::find(tables, table) != tables.end(); };
+  std::map<std::string, std::set<std::string>> taken = {{"node", {ground}}}; // springs refer to the ground
+  for (const SceneKey& key : keys_of(scene))
+  {
+    const auto* table = std::get_if<TableTarget>(&key.target);
+    for (std::size_t i = 0; table && table->form == TableForm::list && i < table->size(); ++i)
+    {
+      const TableEntry entry = table->entry(i);
+      if (scene.matrices && !is_in(of_matrices, key.name))
+        places.refuse(entry.member, heading_of(key) + " belongs to mesh and point scenes; in a matrix scene the "
+                                                      "folder's files hold it");
+      if (!scene.matrices && !scene.mesh && is_in(of_mesh, key.name))
+        places.refuse(entry.member, heading_of(key) + " needs a [mesh]; without one give [[point]], [[spring]] and "
+                                                      "[[force]]");
+      if (entry.name.empty() || key.name == "step") continue;
+      if (!taken[is_in(nodes, key.name) ? "node" : key.name].insert(entry.name).second)
+        places.refuse(std::get<std::string*>(entry.keys.front().target),
+                      heading_of(key) + " name = \"" + entry.name + "\" is taken; give another name");
+    }
+  }
+}
+
+} // namespace
+
+void check_scene(Scene& scene, const Places& places)
+{
+  const Checker checker(scene, places);
+  checker.check_source();
+  check_tables(scene, places);
+  checker.check_all();
 }
 
 } // namespace squeal

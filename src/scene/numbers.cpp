@@ -30,19 +30,6 @@ std::vector<std::string> named_keys(const Scene& scene)
   return keys;
 }
 
-/// Does a check; the text of an Error of it then begins with `prefix`.
-template <class Check> void prefixed(const std::string& prefix, Check check)
-{
-  try
-  {
-    check();
-  }
-  catch (const Error& error)
-  {
-    throw Error(prefix + error.what());
-  }
-}
-
 } // namespace
 
 std::vector<SceneNumber> numbers_of(std::span<const std::string> keys, std::span<const double> values)
@@ -142,75 +129,36 @@ void read_design_table(const std::filesystem::path& file, std::vector<std::strin
                                 "a line of values for each point");
 }
 
-/// The checks of a sweep, each of which throws Error with the place of the wrong value.
-class SweepChecker
+/// Takes over the points of the file, whose numbers are of the scene; what makes no scene fails as a point.
+void take_design(SweepSettings& sweep, const Scene& scene, const Places& places)
 {
-public:
-  SweepChecker(SweepSettings& sweep, const Scene& scene, const Places& places)
-      : sweep_(sweep), scene_(scene), places_(places)
-  {
-  }
+  if (sweep.from != sweep.to || !sweep.values.empty())
+    places.refuse(&sweep.table, "[sweep] table holds all values: take from, to and values out");
+  std::vector<std::string> keys;
+  read_design_table(sweep.table, keys, sweep.design);
+  if (!sweep.key.empty() && sweep.key != keys) places.refuse(&sweep.key, "[sweep] table holds the keys: take key out");
+  sweep.key = keys;
+  for (const std::string& key : sweep.key)
+    prefixed(sweep.table.string() + ": ", [&] { (void)number_at(scene, key, "[sweep] table:"); });
+}
 
-  void check_all()
-  {
-    if (!sweep_.table.empty()) read_design();
-    if (sweep_.key.empty()) fail(&sweep_, "needs the key 'key', the number that changes, or 'table', a file of points");
-    if (!sweep_.table.empty()) return;
-    if (sweep_.key.size() > 1)
-      fail(&sweep_.key, "names " + std::to_string(sweep_.key.size()) + " numbers: give one, or a table of points");
-    const std::string& key = sweep_.key.front();
-    prefixed(places_.at(&sweep_.key) + ": ", [&] { (void)number_at(scene_, key, "[sweep]"); });
-    check_form();
-    if (sweep_.values.empty())
-      for (const double* end : {&sweep_.from, &sweep_.to})
-        need_scene(scene_, {key, *end}, places_.at(end), "[sweep] this end is no scene: ");
-    for (const double value : sweep_.values)
-      need_scene(scene_, {key, value}, places_.at(&sweep_.values), "[sweep] one of the values is no scene: ");
-  }
-
-private:
-  [[noreturn]] void fail(const void* member, const std::string& text) const
-  {
-    throw Error(places_.at(member) + ": [sweep] " + text);
-  }
-
-  /// The points of the file, whose numbers are of the scene; what makes no scene fails as a point.
-  void read_design()
-  {
-    if (sweep_.from != sweep_.to || !sweep_.values.empty())
-      fail(&sweep_.table, "table holds all values: take from, to and values out");
-    std::vector<std::string> keys;
-    read_design_table(sweep_.table, keys, sweep_.design);
-    if (!sweep_.key.empty() && sweep_.key != keys) fail(&sweep_.key, "table holds the keys: take key out");
-    sweep_.key = keys;
-    for (const std::string& key : sweep_.key)
-      prefixed(sweep_.table.string() + ": ", [&] { (void)number_at(scene_, key, "[sweep] table:"); });
-  }
-
-  /// A list of values, or a grid.
-  void check_form()
-  {
-    if (!sweep_.values.empty())
-    {
-      if (sweep_.from != sweep_.to || sweep_.points != SweepSettings{}.points)
-        fail(&sweep_.values, "values exclude from, to and points: keep one form");
-      std::vector<double> sorted = sweep_.values;
-      std::ranges::sort(sorted);
-      if (const auto twice = std::ranges::adjacent_find(sorted); twice != sorted.end())
-        fail(&sweep_.values, "values holds " + text_of_number(*twice) + " twice: take one of them out");
-      return;
-    }
-    if (sweep_.from == sweep_.to)
-      fail(places_.given.contains(&sweep_.to) ? static_cast<const void*>(&sweep_.to) : &sweep_.key,
-           "from and to are both " + text_of_number(sweep_.to) + ": give a range, or values");
-    if (sweep_.points < 2)
-      fail(&sweep_.points, "points = " + std::to_string(sweep_.points) + ": a grid has at least two");
-  }
-
-  SweepSettings& sweep_;
-  const Scene& scene_;
-  const Places& places_;
-};
+/// Throws Error for what is neither a list of values nor a grid.
+void check_form(const SweepSettings& sweep, const Places& places)
+{
+  std::vector<double> sorted = sweep.values;
+  std::ranges::sort(sorted);
+  const auto twice = std::ranges::adjacent_find(sorted);
+  if (!sorted.empty() && (sweep.from != sweep.to || sweep.points != SweepSettings{}.points))
+    places.refuse(&sweep.values, "[sweep] values exclude from, to and points: keep one form");
+  if (twice != sorted.end())
+    places.refuse(&sweep.values, "[sweep] values holds " + text_of_number(*twice) + " twice: take one of them out");
+  if (!sorted.empty()) return;
+  if (sweep.from == sweep.to)
+    places.refuse(places.given.contains(&sweep.to) ? static_cast<const void*>(&sweep.to) : &sweep.key,
+                  "[sweep] from and to are both " + text_of_number(sweep.to) + ": give a range, or values");
+  if (sweep.points < 2)
+    places.refuse(&sweep.points, "[sweep] points = " + std::to_string(sweep.points) + ": a grid has at least two");
+}
 
 } // namespace
 
@@ -218,23 +166,38 @@ void resolve_branch(Scene& scene, const Places& places)
 {
   if (!scene.branch) return;
   BranchSettings& branch = *scene.branch;
-  const auto fail = [&](const void* member, const std::string& text) { throw Error(places.at(member) + ": " + text); };
   prefixed(places.at(&branch.key) + ": ", [&] { branch.own = number_at(scene, branch.key, "[branch]"); });
   if (branch.from == branch.to)
-    fail(&branch.to, "[branch] from and to are both " + text_of_number(branch.to) + ": give a range");
+    places.refuse(&branch.to, "[branch] from and to are both " + text_of_number(branch.to) + ": give a range");
   if (branch.own < std::min(branch.from, branch.to) || branch.own > std::max(branch.from, branch.to))
-    fail(&branch.from, "[branch] the scene has " + branch.key + " = " + text_of_number(branch.own) +
-                           ", where the branch starts: it must lie between from = " + text_of_number(branch.from) +
-                           " and to = " + text_of_number(branch.to));
+    places.refuse(&branch.from, "[branch] the scene has " + branch.key + " = " + text_of_number(branch.own) +
+                                    ", where the branch starts: it must lie between from = " +
+                                    text_of_number(branch.from) + " and to = " + text_of_number(branch.to));
   if (!scene.cycle.enabled)
-    fail(&branch.key, "[branch] starts from the cycle of the scene: give [cycle], or enable it");
+    places.refuse(&branch.key, "[branch] starts from the cycle of the scene: give [cycle], or enable it");
   for (const double* end : {&branch.from, &branch.to})
     need_scene(scene, {branch.key, *end}, places.at(end), "[branch] this end is no scene: ");
 }
 
 void resolve_sweep(Scene& scene, const Places& places)
 {
-  if (scene.sweep) SweepChecker(*scene.sweep, scene, places).check_all();
+  if (!scene.sweep) return;
+  SweepSettings& sweep = *scene.sweep;
+  if (!sweep.table.empty()) take_design(sweep, scene, places);
+  if (sweep.key.empty())
+    places.refuse(&sweep, "[sweep] needs the key 'key', the number that changes, or 'table', a file of points");
+  if (!sweep.table.empty()) return;
+  if (sweep.key.size() > 1)
+    places.refuse(&sweep.key,
+                  "[sweep] names " + std::to_string(sweep.key.size()) + " numbers: give one, or a table of points");
+  const std::string& key = sweep.key.front();
+  prefixed(places.at(&sweep.key) + ": ", [&] { (void)number_at(scene, key, "[sweep]"); });
+  check_form(sweep, places);
+  if (sweep.values.empty())
+    for (const double* end : {&sweep.from, &sweep.to})
+      need_scene(scene, {key, *end}, places.at(end), "[sweep] this end is no scene: ");
+  for (const double value : sweep.values)
+    need_scene(scene, {key, value}, places.at(&sweep.values), "[sweep] one of the values is no scene: ");
 }
 
 namespace
@@ -332,13 +295,12 @@ void check_sensitivity(const Scene& scene, const Places& places)
   const std::vector<std::string> probes = names_of(scene.probes);
   for (const Change& change : scene.changes)
   {
-    if (!scene.sensitivity)
-      throw Error(places.at(&change) + ": [[change]] is part of [sensitivity]: give that table too");
+    if (!scene.sensitivity) places.refuse(&change, "[[change]] is part of [sensitivity]: give that table too");
     if (std::ranges::find(probes, change.probe) == probes.end())
-      throw Error(places.at(&change.probe) + ": [[change]] probe = \"" + change.probe + "\" is not defined" +
-                  hint_or_list(change.probe, probes));
+      places.refuse(&change.probe,
+                    "[[change]] probe = \"" + change.probe + "\" is not defined" + hint_or_list(change.probe, probes));
     if (change.mass == 0 && change.damping == 0 && change.stiffness == 0)
-      throw Error(places.at(&change) + ": [[change]] at " + change.probe + " has neither mass, damping nor stiffness");
+      places.refuse(&change, "[[change]] at " + change.probe + " has neither mass, damping nor stiffness");
   }
 }
 

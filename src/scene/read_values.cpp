@@ -1,4 +1,5 @@
 /// From TOML tables to the members that scene_keys.cpp binds to their keys, by the keys' rules.
+#include "bound_numbers.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/error.hpp"
 #include "toml_values.hpp"
@@ -222,15 +223,23 @@ private:
     if (!named && !node.is_number()) fail(node, expected, hint_of_number(node));
     const double value = named ? *named : *node.value<double>();
     if (!std::isfinite(value)) fail(node, expected);
-    if (const std::string problem = problem_of_number(Rule::any, value); !problem.empty()) fail(node, problem);
+    need_allowed(node, Rule::any, value);
     return value;
+  }
+
+  /// Throws Error for a number that a rule does not allow.
+  void need_allowed(const toml::node& node, Rule rule, double value) const
+  {
+    const std::string problem = problem_of_number(rule, value),
+                      text = text_of(node) + (node.is_string() ? " = " + text_of_number(value) : "");
+    if (!problem.empty()) refuse_value(value_.key, place(node), text, problem, "");
   }
 
   double number(const toml::node& node) const
   {
     const std::string expected = bounds_of(value_.key.rule).text;
     const double value = finite(node, expected + (node.is_number() ? "" : ", not " + kind_of(node)));
-    if (const std::string problem = problem_of_number(value_.key.rule, value); !problem.empty()) fail(node, problem);
+    need_allowed(node, value_.key.rule, value);
     return value;
   }
 

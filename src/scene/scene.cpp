@@ -146,6 +146,11 @@ std::string Places::at(const void* member) const
   return found == given.end() ? file : found->second;
 }
 
+void Places::refuse(const void* member, const std::string& text) const
+{
+  throw Error(at(member) + ": " + text);
+}
+
 Scene read_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides)
 {
   toml::table root = parse_file(file);

@@ -19,10 +19,7 @@ protected:
       nodes_.insert(nodes_.end(), names.begin(), names.end());
   }
 
-  [[noreturn]] void fail(const void* member, const std::string& text) const
-  {
-    throw Error(places_.at(member) + ": " + text);
-  }
+  [[noreturn]] void fail(const void* member, const std::string& text) const { places_.refuse(member, text); }
 
   /// Throws Error if a name is not known.
   void need_known(const std::string& name, const std::vector<std::string>& known, const void* member,

@@ -52,6 +52,9 @@ struct Places
 
   /// Returns the place of a member; the file if it was not given.
   std::string at(const void* member) const;
+
+  /// Throws Error with the place of a member.
+  [[noreturn]] void refuse(const void* member, const std::string& text) const;
 };
 
 /// Places of a scene that was checked: what it needs is given, in its file.
@@ -66,7 +69,7 @@ template <class Entry> std::vector<std::string> names_of(const std::vector<Entry
 }
 
 /// Throws Error on contradictions between keys: undefined or repeated names, tables that exclude each other.
-void check_scene(const Scene& scene, const Places& places);
+void check_scene(Scene& scene, const Places& places);
 
 /// Throws Error on contradictions in what joins bodies, in the frames of supports and in loss factors.
 void check_joining(const Scene& scene, const Places& places);

@@ -23,30 +23,24 @@ double standard_quantile(double part)
   return boost::math::quantile(standard, least + part * (1 - 2 * least));
 }
 
-void check_form(const UncertainNumber& number, const Places& places)
+/// What is wrong with the keys of a number's distribution; empty: nothing.
+std::string problem_of_form(const UncertainNumber& number)
 {
-  const std::string label = "[[uncertain]] " + number.key + " ";
   if (number.distribution == Distribution::uniform)
-  {
-    if (number.mean != 0 || number.deviation != 0)
-      throw Error(places.at(&number) + ": " + label + "is uniform: give from and to, not mean and deviation");
-    if (!(number.from < number.to))
-      throw Error(places.at(&number) + ": " + label + "is uniform: give from, and a greater to");
-    return;
-  }
+    return number.mean != 0 || number.deviation != 0 ? "is uniform: give from and to, not mean and deviation"
+           : number.from < number.to                 ? ""
+                                                     : "is uniform: give from, and a greater to";
   if (number.from != 0 || number.to != 0)
-    throw Error(places.at(&number) + ": " + label + "is " + word(number.distribution) +
-                ": give mean and deviation, not from and to");
-  if (number.deviation == 0)
-    throw Error(places.at(&number) + ": " + label + "needs a deviation, in the number's own unit");
+    return std::string("is ") + word(number.distribution) + ": give mean and deviation, not from and to";
+  return number.deviation == 0 ? "needs a deviation, in the number's own unit" : "";
 }
 
 /// How far a number is taken, and what keeps it nearer, to go before what is wrong with that.
 std::string reach_of(const UncertainNumber& number, double end)
 {
-  if (number.distribution == Distribution::uniform) return format(" is taken to %g: ", end);
+  if (number.distribution == Distribution::uniform) return format("is taken to %g: ", end);
   return format(
-      " is taken to %g, %g deviations from its middle; a smaller deviation, or distribution \"uniform\"%s, keeps "
+      "is taken to %g, %g deviations from its middle; a smaller deviation, or distribution \"uniform\"%s, keeps "
       "it nearer: ",
       end, cut_off, number.distribution == Distribution::normal ? " or \"lognormal\"" : "");
 }
@@ -66,31 +60,27 @@ double quantile(const UncertainNumber& number, double part)
 void resolve_robustness(Scene& scene, const Places& places)
 {
   if (!scene.robustness && !scene.uncertain.empty())
-    throw Error(places.at(&scene.uncertain.front()) + ": [[uncertain]] is part of [robustness]: give that table too");
+    places.refuse(&scene.uncertain.front(), "[[uncertain]] is part of [robustness]: give that table too");
   if (!scene.robustness) return;
   RobustnessSettings& settings = *scene.robustness;
-  if (scene.uncertain.empty())
-    throw Error(places.at(&settings) + ": [robustness] has no random number: give [[uncertain]] tables");
+  if (scene.uncertain.empty()) places.refuse(&settings, "[robustness] has no random number: give [[uncertain]] tables");
   if (settings.confidence <= 0 || settings.confidence >= 1)
-    throw Error(places.at(&settings.confidence) + ": [robustness] confidence must be between 0 and 1, such as 0.95");
+    places.refuse(&settings.confidence, "[robustness] confidence must be between 0 and 1, such as 0.95");
   std::set<std::string> keys;
-  for (UncertainNumber& number : scene.uncertain) try
-    {
-      if (!keys.insert(number.key).second) throw Error("[[uncertain]] " + number.key + " is there twice: keep one");
-      const double own = number_at(scene, number.key, "[[uncertain]]");
-      if (number.mean == 0 && number.distribution != Distribution::uniform) number.mean = own;
-      check_form(number, places);
-      if (number.distribution == Distribution::lognormal && number.mean <= 0)
-        throw Error("[[uncertain]] " + number.key + " is lognormal: its mean must be positive");
-      for (const double part : {0., 1.})
-        need_scene(scene, {number.key, quantile(number, part)}, places.at(&number),
-                   "[[uncertain]] " + number.key + reach_of(number, quantile(number, part)));
-    }
-    catch (const Error& error)
-    {
-      const std::string place = places.at(&number), text = error.what();
-      throw Error(text.starts_with(place) ? text : place + ": " + text);
-    }
+  for (UncertainNumber& number : scene.uncertain)
+  {
+    const std::string label = "[[uncertain]] " + number.key + " ";
+    if (!keys.insert(number.key).second) places.refuse(&number, label + "is there twice: keep one");
+    double own = 0;
+    prefixed(places.at(&number) + ": ", [&] { own = number_at(scene, number.key, "[[uncertain]]"); });
+    if (number.mean == 0 && number.distribution != Distribution::uniform) number.mean = own;
+    if (const std::string problem = problem_of_form(number); !problem.empty()) places.refuse(&number, label + problem);
+    if (number.distribution == Distribution::lognormal && number.mean <= 0)
+      places.refuse(&number, label + "is lognormal: its mean must be positive");
+    for (const double part : {0., 1.})
+      need_scene(scene, {number.key, quantile(number, part)}, places.at(&number),
+                 label + reach_of(number, quantile(number, part)));
+  }
 }
 
 } // namespace squeal
