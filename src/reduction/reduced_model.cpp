@@ -99,10 +99,7 @@ void set_matrices(ReducedModel& model, const LinearisedPoint& point, MultiVector
   model.C = std::move(projected.C);
   model.K = std::move(projected.K);
   model.K_z = basis.K.products;
-  if (basis.rayleigh)
-    model.C_z = basis.rayleigh->of_mass * model.M_z + basis.rayleigh->of_stiffness * model.K_z;
-  else
-    model.C_z = basis.C.products;
+  model.C_z = basis.C.products;
   model.G = whole_product(B, basis.T);
   model.H = (model.G + whole_product(at_pivots(B, point.contact), left.change)).transpose();
   model.shapes = std::move(basis.T);

@@ -20,50 +20,38 @@ using Eigen::MatrixXd;
 /// The local rows of the degrees of freedom at which some row of B has an entry, ascending.
 std::vector<Index> dofs_with_entries(Mat B)
 {
-  const Owned<Vec> marks = vector_of_columns(B);
-  check(VecSet(marks, 0));
-  for_each_row(
-      B,
-      [&](PetscInt, std::span<const PetscInt> columns, std::span<const PetscScalar>)
-      {
-        const std::vector<PetscScalar> ones(columns.size(), 1);
-        check(VecSetValues(marks, static_cast<PetscInt>(columns.size()), columns.data(), ones.data(), INSERT_VALUES));
-      });
-  check(VecAssemblyBegin(marks));
-  check(VecAssemblyEnd(marks));
-  PetscInt size = 0;
-  const PetscScalar* values = nullptr;
+  PetscInt first = 0, last = 0, columns = 0;
+  check(MatGetOwnershipRangeColumn(B, &first, &last));
+  check(MatGetSize(B, nullptr, &columns));
+  std::vector<PetscReal> largest(static_cast<std::size_t>(columns));
+  check(MatGetColumnNorms(B, NORM_INFINITY, largest.data()));
   std::vector<Index> rows;
-  check(VecGetLocalSize(marks, &size));
-  check(VecGetArrayRead(marks, &values));
-  for (PetscInt i = 0; i < size; ++i)
-    if (values[i] > 0) rows.push_back(i);
-  check(VecRestoreArrayRead(marks, &values));
+  for (PetscInt dof = first; dof < last; ++dof)
+    if (largest[static_cast<std::size_t>(dof)] > 0) rows.push_back(dof - first);
   return rows;
 }
 
-/// Those of matrices that no others give.
+/// Those of the matrices that there are.
 std::vector<BasisImage*> images_of(SlidingBasis& basis)
 {
   std::vector<BasisImage*> images;
   for (BasisImage* image : {&basis.M, &basis.C, &basis.K, &basis.K_loss, &basis.G, &basis.H})
-    if (image->matrix.get() && !(basis.rayleigh && image == &basis.C)) images.push_back(image);
+    if (image->matrix.get()) images.push_back(image);
   return images;
 }
 
-/// `A` may be null. Returns whether it is another one.
-bool set_matrix(const SlidingBasis& basis, BasisImage& image, Mat A)
+/// `A` may be null.
+void set_matrix(const SlidingBasis& basis, BasisImage& image, Mat A)
 {
-  if (image.matrix.get() == A) return false;
+  if (image.matrix.get() == A) return;
   image = {image.sign};
-  if (!A) return true;
+  if (!A) return;
   image.matrix = shared(A);
   image.contact_rows = {basis.T.comm, MatrixXd(basis.contact_dofs.size(), basis.T.columns())};
   const auto take_rows = [&](Index first, const MultiVector& part)
   { image.contact_rows.entries.middleCols(first, part.columns()) = part.entries(basis.contact_dofs, Eigen::all); };
   image.products = symmetric_inner_products(basis.T, A, take_rows);
   if (image.sign < 0) image.products.triangularView<Eigen::StrictlyUpper>() = -image.products.transpose();
-  return true;
 }
 
 /// Other degrees of freedom of the contact need other rows of every image.
@@ -78,16 +66,6 @@ void set_contact(SlidingBasis& basis, Mat B)
   basis.contact_dofs = std::move(dofs);
   basis.whole_C = {};
   for (BasisImage* image : {&basis.M, &basis.C, &basis.K, &basis.K_loss, &basis.G, &basis.H}) image->matrix = {};
-}
-
-void set_damping(SlidingBasis& basis, Mat M, Mat C, Mat K)
-{
-  basis.rayleigh = rayleigh_part(M, C, K);
-  basis.C = {};
-  if (basis.rayleigh)
-    basis.C.matrix = shared(C);
-  else
-    set_matrix(basis, basis.C, C);
 }
 
 Owned<IS> set_of(MPI_Comm comm, const std::vector<PetscInt>& places)
@@ -166,10 +144,11 @@ SlidingBasis make_basis(const Structure& structure, const Interface& interface, 
 void set_model(SlidingBasis& basis, const Structure& structure, const Interface& interface)
 {
   set_contact(basis, interface.B);
-  const Owned<Mat> C_0 = structure.K_loss.get() ? without_loss(structure.C, structure) : Owned<Mat>{};
-  const Mat C = C_0.get() ? C_0 : structure.C;
-  const bool other_M = set_matrix(basis, basis.M, structure.M), other_K = set_matrix(basis, basis.K, structure.K);
-  if (other_M || other_K || basis.whole_C.get() != structure.C) set_damping(basis, structure.M, C, structure.K);
+  set_matrix(basis, basis.M, structure.M);
+  set_matrix(basis, basis.K, structure.K);
+  if (basis.whole_C.get() != structure.C)
+    set_matrix(basis, basis.C,
+               structure.K_loss.get() ? without_loss(structure.C, structure) : shared(structure.C.get()));
   basis.whole_C = shared(structure.C.get());
   set_matrix(basis, basis.K_loss, structure.K_loss);
   set_matrix(basis, basis.G, structure.G);
@@ -265,11 +244,8 @@ ProjectedSliding project(const SlidingBasis& basis, const LinearisedPoint& point
   Lifts lifts{lift(basis, contact, contact.Z), lift(basis, contact, contact.Y), pivot_set(contact)};
   for (const Index pivot : lifts.by_Z.pivots)
     lifts.in_contact.push_back(std::ranges::lower_bound(basis.contact_dofs, pivot) - basis.contact_dofs.begin());
-  ProjectedSliding result{lifted(basis.M, lifts), {}, lifted(basis.K, lifts), lifted(basis.K_loss, lifts)};
-  if (basis.rayleigh)
-    result.C = basis.rayleigh->of_mass * result.M + basis.rayleigh->of_stiffness * result.K;
-  else
-    result.C = lifted(basis.C, lifts);
+  ProjectedSliding result{lifted(basis.M, lifts), lifted(basis.C, lifts), lifted(basis.K, lifts),
+                          lifted(basis.K_loss, lifts)};
   if (basis.G.matrix.get()) result.C += lifted(basis.G, lifts);
   if (basis.H.matrix.get()) result.K += lifted(basis.H, lifts);
   if (point.damping.get()) result.C += projected_on_pairs(basis, point, lifts, point.damping);
@@ -292,24 +268,17 @@ MultiVector dynamic_forces(const SlidingBasis& basis, const LinearisedPoint& poi
   };
   // lambda^2 M x + lambda C x + K x + f K_loss x, the factors within the weights
   const Eigen::MatrixXcd rates = of.lambda.asDiagonal() * of.weights;
-  MultiVector x = lifted(of.weights), v = lifted(rates), acceleration = lifted(of.lambda.asDiagonal() * rates);
-  MultiVector force{x.comm, MatrixXd::Zero(x.entries.rows(), x.columns())};
+  const MultiVector x = lifted(of.weights), v = lifted(rates);
+  MultiVector force = product(structure.M, lifted(of.lambda.asDiagonal() * rates));
   const auto add = [&](double factor, const MultiVector& part) { force.entries += factor * part.entries; };
-  if (structure.H.get()) add(of_skew, product(structure.H, x));
-  if (point.stiffness.get()) add(1, on_pairs(point.stiffness, x));
+  add(1, product(basis.C.matrix, v));
+  add(1, product(structure.K, x));
   if (structure.K_loss.get())
     add(1, product(structure.K_loss, lifted(of.lambda.unaryExpr(&loss_factor_of).asDiagonal() * of.weights)));
   if (structure.G.get()) add(of_skew, product(structure.G, v));
+  if (structure.H.get()) add(of_skew, product(structure.H, x));
   if (point.damping.get()) add(1, on_pairs(point.damping, v));
-  if (basis.rayleigh)
-  {
-    x.entries += basis.rayleigh->of_stiffness * v.entries;
-    acceleration.entries += basis.rayleigh->of_mass * v.entries;
-  }
-  else
-    add(1, product(basis.C.matrix, v));
-  add(1, product(structure.K, x));
-  add(1, product(structure.M, acceleration));
+  if (point.stiffness.get()) add(1, on_pairs(point.stiffness, x));
   return product(test, force);
 }
 

@@ -34,7 +34,6 @@ struct SlidingBasis
   std::vector<Eigen::Index> contact_dofs{}; // of B: local rows, ascending
   BasisImage M{}, C{}, K{}, K_loss{};       // C without the viscous equivalent of loss factors
   Owned<Mat> whole_C{};                     // the structure's, which C was taken from
-  std::optional<Rayleigh> rayleigh{};       // of C, whose image has then the matrix alone
   BasisImage G{-1}, H{-1};
 
   Eigen::Index shapes() const { return T.columns() - sketched; }
