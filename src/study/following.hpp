@@ -1,6 +1,10 @@
 #pragma once
-/// Modes followed from point to point by the biorthogonal MAC (src/README.md, section 10.3).
+/// Modes followed from point to point by the biorthogonal MAC, and where they become unstable or stable between two
+/// points (src/README.md, sections 10.3 and 10.5).
 #include "point_modes.hpp"
+#include "squeal/study/sweep.hpp"
+
+#include <functional>
 
 namespace squeal
 {
@@ -53,5 +57,21 @@ std::vector<int> names_by_shapes(const PointModes& reference, const PointModes& 
 /// For each mode of the first point its match at the second one, by the MAC of right with left vectors, which is at
 /// least `clear`. Not collective.
 std::vector<Match> follow(const ModeForms& forms, double clear);
+
+/// What a search between two points needs.
+struct ThresholdSearch
+{
+  std::function<std::optional<Followed>(double value)> point_at; // of the first number; nothing where it fails
+  std::function<std::vector<Match>(const Followed& from, const Followed& to)> follow;
+  double band = 0;      // [Hz]
+  double tolerance = 0; // of the first number
+  int& tracks;          // number so far
+};
+
+/// All that show between two points, each with points on both sides within the tolerance, whose numbers of unstable
+/// modes differ there. A point that fails ends the search with the brackets known. Sets the tracks of the second point
+/// by the points on the way; -1: unclear. Collective.
+std::vector<Threshold> find_thresholds(const ThresholdSearch& search, const Followed& before, Followed& now,
+                                       const std::vector<Match>& matches);
 
 } // namespace squeal

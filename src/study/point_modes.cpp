@@ -9,7 +9,6 @@
 #include <cmath>
 #include <Eigen/Cholesky>
 #include <random>
-#include <ranges>
 
 namespace squeal
 {
@@ -32,23 +31,22 @@ constexpr Index mixtures = 24;  // of the residuals of a side: more directions t
 constexpr int most_passes = 20; // corrections of the basis; the first one of a brake may need more than 8
 constexpr double spurious_mode = 1e-8; // backward error of what is no mode
 
-/// The problem at a point on the basis. `kept`: inner products of the shapes without the pivots. `independent`:
-/// combinations of shapes that stay so without the pivots; empty: all do.
+/// The problem at a point on the basis. `kept`: inner products of the shapes without the pivots. `empty`: orthonormal
+/// combinations of shapes that hold nothing but pivots.
 struct PointMatrices : ProjectedSliding
 {
-  MatrixXd kept{}, independent{};
+  MatrixXd kept{}, empty{};
 };
 
-/// Orthonormal combinations of the shapes that hold more than a trace of other degrees of freedom than the pivots, by
-/// the inner products without these; empty: every combination does. What a lift makes of the others is rounding: its
-/// projection is singular, with any number for an eigenvalue.
-MatrixXd independent_part(const MatrixXd& kept)
+/// Those of which less than a trace is of other degrees of freedom, by the inner products without the pivots. What a
+/// lift makes of that is rounding: its projection is singular, with any number for an eigenvalue.
+MatrixXd empty_part(const MatrixXd& kept)
 {
   constexpr double trace = 1e-12; // square of a part of 1e-6: rounding leaves it a relative error of 1e-10
   const MatrixXd shifted = kept - trace * MatrixXd::Identity(kept.rows(), kept.cols());
-  if (shifted.llt().info() == Eigen::Success) return {}; // as mostly, at a tenth of the work
+  if (shifted.llt().info() == Eigen::Success) return MatrixXd(kept.rows(), 0); // as mostly, at a tenth of the work
   const SymmetricEigenpairs parts = solve_dense_symmetric(kept);
-  return parts.y.rightCols((parts.lambda.array() >= trace).count());
+  return parts.y.leftCols((parts.lambda.array() < trace).count());
 }
 
 PointMatrices matrices_at(const SlidingBasis& basis, const LinearisedPoint& point)
@@ -57,7 +55,7 @@ PointMatrices matrices_at(const SlidingBasis& basis, const LinearisedPoint& poin
   const MultiVector at_pivots{basis.T.comm, basis.T.entries(local_pivots(point.contact), Eigen::all)},
       of_shapes = columns_from(at_pivots, basis.sketched);
   at.kept = MatrixXd::Identity(basis.shapes(), basis.shapes()) - inner_products(of_shapes, of_shapes);
-  at.independent = independent_part(at.kept);
+  at.empty = empty_part(at.kept);
   return at;
 }
 
@@ -91,10 +89,14 @@ MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, Side side)
 /// Pairs of the projected problem, and how exact they are in the full one.
 struct SolvedPairs
 {
-  std::vector<TwoSidedPair> pairs; // falling growth rate
-  std::vector<double> right, left; // backward errors of the vectors
+  std::vector<TwoSidedPair> pairs;             // falling growth rate
+  std::array<std::vector<double>, 2> errors{}; // backward ones of the vectors, by sides
 
-  double backward_error(std::size_t k) const { return left[k] <= right[k] ? right[k] : left[k]; } // NaN of either
+  double backward_error(std::size_t k) const // NaN of either
+  {
+    const double right = errors[0][k], left = errors[1][k];
+    return left <= right ? right : left;
+  }
 };
 
 /// Backward errors in the full problem, estimated by the random vectors. Left vectors solve the transposed problem.
@@ -172,59 +174,25 @@ double tolerance_of(const TwoSidedPair& pair, const PointProblem& problem)
   return near ? std::min(problem.tolerance, std::max(exact_tolerance, 0.01 * problem.tolerance)) : problem.tolerance;
 }
 
-/// The largest backward error over its tolerance.
-double largest_excess(const SolvedPairs& solved, const PointProblem& problem)
-{
-  double largest = 0;
-  for (std::size_t k = 0; k < solved.pairs.size(); ++k)
-    largest = std::max(largest, solved.backward_error(k) / tolerance_of(solved.pairs[k], problem));
-  return largest;
-}
-
 /// Those pairs whose error of a side exceeds the tolerance.
 std::vector<TwoSidedPair> inexact(const SolvedPairs& solved, const PointProblem& problem, Side side)
 {
-  const std::vector<double>& errors = side == Side::right ? solved.right : solved.left;
+  const std::vector<double>& errors = solved.errors[static_cast<std::size_t>(side)];
   std::vector<TwoSidedPair> chosen;
   for (std::size_t k = 0; k < solved.pairs.size(); ++k)
     if (errors[k] > tolerance_of(solved.pairs[k], problem)) chosen.push_back(solved.pairs[k]);
   return chosen;
 }
 
-/// The backward errors of pairs of the projected problem.
-SolvedPairs with_errors(const ModesBasis& modes, const PointMatrices& on_basis, std::vector<TwoSidedPair> pairs)
-{
-  SolvedPairs solved{std::move(pairs), {}, {}};
-  solved.right = backward_errors(modes, on_basis, solved.pairs, Side::right);
-  solved.left = backward_errors(modes, on_basis, solved.pairs, Side::left);
-  return solved;
-}
-
-/// The projected problem on the independent combinations of the shapes, which come after the sketched columns; K_loss
-/// is empty without loss factors.
+/// The projected problem on the shapes, which come after the sketched columns; K_loss is empty without loss factors.
+/// What holds nothing is held by springs as stiff as the structure: it vibrates far above any window.
 LossyMatrices without_sketch(const PointMatrices& on_basis, Index shapes)
 {
-  const MatrixXd& V = on_basis.independent;
   const auto on_shapes = [&](const MatrixXd& A) -> MatrixXd
-  {
-    if (A.size() == 0) return {};
-    const auto corner = A.bottomRightCorner(shapes, shapes);
-    return V.size() > 0 ? MatrixXd(V.transpose() * corner * V) : MatrixXd(corner);
-  };
-  return {on_shapes(on_basis.M), on_shapes(on_basis.C), on_shapes(on_basis.K), on_shapes(on_basis.K_loss)};
-}
-
-/// Vectors of pairs on other coordinates.
-void transform(std::vector<TwoSidedPair>& pairs, const MatrixXd& of_right, const MatrixXd& of_left)
-{
-  if (pairs.empty()) return;
-  const MatrixXcd right = real_times(of_right, vectors_of(pairs, Side::right)),
-                  left = real_times(of_left, vectors_of(pairs, Side::left));
-  for (std::size_t k = 0; k < pairs.size(); ++k)
-  {
-    pairs[k].right = right.col(static_cast<Index>(k));
-    pairs[k].left = left.col(static_cast<Index>(k));
-  }
+  { return A.bottomRightCorner(std::min(A.rows(), shapes), std::min(A.cols(), shapes)); };
+  LossyMatrices result{on_shapes(on_basis.M), on_shapes(on_basis.C), on_shapes(on_basis.K), on_shapes(on_basis.K_loss)};
+  result[2] += result[2].norm() * on_basis.empty * on_basis.empty.transpose();
+  return result;
 }
 
 /// The pairs of the projected problem in the window, falling growth rate.
@@ -233,9 +201,11 @@ SolvedPairs solve_projected(const ModesBasis& modes, const PointMatrices& on_bas
   std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(
       modes.basis.T.comm, without_sketch(on_basis, modes.basis.shapes()), std::sqrt(window.limit));
   std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !window.holds(pair.lambda); });
-  if (const MatrixXd& V = on_basis.independent; V.size() > 0) transform(pairs, V, V);
   std::ranges::stable_sort(pairs, std::greater{}, [](const TwoSidedPair& pair) { return pair.lambda.real(); });
-  return with_errors(modes, on_basis, std::move(pairs));
+  SolvedPairs solved{std::move(pairs)};
+  for (const Side side : {Side::right, Side::left})
+    solved.errors[static_cast<std::size_t>(side)] = backward_errors(modes, on_basis, solved.pairs, side);
+  return solved;
 }
 
 /// The result of a point, without what is no mode.
@@ -243,24 +213,25 @@ PointModes modes_of(SolvedPairs& solved, const PointProblem& problem, const Poin
 {
   PointModes result;
   result.outcome.kind = OutcomeKind::converged;
-  const auto inexact =
-      std::ranges::count_if(std::views::iota(std::size_t{0}, solved.pairs.size()), [&](std::size_t k)
-                            { return !(solved.backward_error(k) <= tolerance_of(solved.pairs[k], problem)); });
-  if (inexact > 0)
+  int above = 0;
+  double largest = 0; // error over its tolerance
+  const std::size_t count = solved.pairs.size();
+  for (std::size_t k = 0; k < count; ++k)
   {
-    result.outcome.kind = OutcomeKind::not_converged;
-    result.outcome.reason = format("%d of %zu eigenvalues have backward errors above %.0e, the largest %.0f times its "
-                                   "tolerance, after %d corrections",
-                                   static_cast<int>(inexact), solved.pairs.size(), problem.tolerance,
-                                   largest_excess(solved, problem), most_passes);
-  }
-  for (std::size_t k = 0; k < solved.pairs.size(); ++k)
-  {
-    const double error = solved.backward_error(k);
+    const double error = solved.backward_error(k), excess = error / tolerance_of(solved.pairs[k], problem);
+    above += !(excess <= 1);
+    largest = std::max(largest, excess);
     if (error > std::max(spurious_mode, problem.tolerance)) continue;
     result.outcome.residual = std::max(result.outcome.residual, error);
     result.pairs.push_back(std::move(solved.pairs[k]));
     result.errors.push_back(error);
+  }
+  if (above > 0)
+  {
+    result.outcome.kind = OutcomeKind::not_converged;
+    result.outcome.reason = format("%d of %zu eigenvalues have backward errors above %.0e, the largest %.0f times its "
+                                   "tolerance, after %d corrections",
+                                   above, count, problem.tolerance, largest, most_passes);
   }
   result.M = on_basis.M.bottomRightCorner(shapes, shapes);
   result.C = on_basis.C.bottomRightCorner(shapes, shapes);

@@ -7,7 +7,6 @@
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 #include "swept_model.hpp"
-#include "thresholds.hpp"
 
 #include <algorithm>
 #include <cmath>

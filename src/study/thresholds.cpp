@@ -1,4 +1,4 @@
-#include "thresholds.hpp"
+#include "following.hpp"
 
 #include "squeal/algebra/root.hpp"
 

@@ -1,5 +1,5 @@
 // What a sweep is made of: zeros in brackets, eigenvalues with both vectors and with losses, thresholds of modes.
-#include "../../src/study/thresholds.hpp"
+#include "../../src/study/following.hpp"
 #include "squeal/algebra/root.hpp"
 #include "squeal/modes/dense_losses.hpp"
 
