@@ -113,15 +113,17 @@ void print_key_page()
       session_option_reference().c_str());
 }
 
-/// The page inputs/RESULTS.md.
-void print_result_page()
+/// The page that is asked for.
+void print_page(const Arguments& arguments)
 {
-  std::fputs(result_page().c_str(), stdout);
-}
-
-void print_versions()
-{
-  for (const auto& [name, version] : versions()) std::printf("%-7s %s\n", name.c_str(), version.c_str());
+  if (arguments.help)
+    print_help();
+  else if (arguments.version)
+    for (const auto& [name, version] : versions()) std::printf("%-7s %s\n", name.c_str(), version.c_str());
+  else if (arguments.reference == ReferencePage::results)
+    std::fputs(result_page().c_str(), stdout);
+  else
+    print_key_page();
 }
 
 /// Throws Error if a state file could not be written after the work. The results' folder will be made.
@@ -276,11 +278,7 @@ int main(int argc, char** argv)
   if (arguments.help && !arguments.section.empty()) return rank != 0 || print_section(arguments.section) ? 0 : 1;
   if (arguments.help || arguments.version || arguments.reference != ReferencePage::none)
   {
-    if (rank == 0)
-      arguments.help                                  ? print_help()
-      : arguments.version                             ? print_versions()
-      : arguments.reference == ReferencePage::results ? print_result_page()
-                                                      : print_key_page();
+    if (rank == 0) print_page(arguments);
     return 0;
   }
   try

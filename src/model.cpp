@@ -259,12 +259,10 @@ Model build_model(Scene& scene, MPI_Comm comm)
   return model;
 }
 
-NearbyModels::NearbyModels(const Model& model, const Scene& scene, MPI_Comm comm)
-    : model_(model), scene_(scene), comm_(comm)
+NearbyModels::NearbyModels(const Model& model, const Scene& scene)
+    : model_(model), scene_(scene),
+      comm_(comm_of(model.structure.load)), own_{sharing(model.structure, model.interface), Values{}}
 {
-  int relation = MPI_UNEQUAL;
-  MPI_Comm_compare(comm, comm_of(model.structure.load), &relation);
-  if (relation == MPI_IDENT) own_ = {sharing(model.structure, model.interface), Values{}};
 }
 
 std::set<Effect> NearbyModels::changes(const Known& known, const Values& values) const

@@ -103,7 +103,7 @@ BrakeBranch run_branch(const SlidingPoint& point, const Motion& motion, const Sc
   const double tolerance = scene.cycle.tolerance > 0 ? scene.cycle.tolerance : plain_tolerance;
   const std::string reason = no_cycle_to_follow(motion.cycle, tolerance);
   if (!reason.empty()) return not_run<BrakeBranch>(OutcomeKind::skipped, reason);
-  NearbyModels models(*point.model, scene, comm_of(point.model->structure.load));
+  NearbyModels models(*point.model, scene);
   const auto model_at = [&](double parameter) {
     return models.at(std::array{SceneNumber{scene.branch->key, parameter}});
   };
@@ -122,7 +122,7 @@ Sensitivity run_sensitivity(const SlidingPoint& point, const Scene& scene, const
   if (!reason.empty()) return not_run<Sensitivity>(OutcomeKind::skipped, reason);
   if (point.model->structure.H.get())
     return not_run<Sensitivity>(OutcomeKind::refused, "the structure has a circulatory part");
-  NearbyModels models(*point.model, scene, comm_of(point.model->structure.load));
+  NearbyModels models(*point.model, scene);
   const auto model_at = [&](std::span<const SceneNumber> numbers)
   {
     std::vector<SceneNumber> all;
@@ -145,7 +145,7 @@ Sweep run_scene_sweep(const Model& model, const Scene& scene, const ProgramOptio
                                                 "direction of rotation is not known, as another code's friction is "
                                                 "in the symmetric part of K as well: sweep one direction, and the "
                                                 "other one with matrices of its own");
-  NearbyModels models(model, scene, comm_of(model.structure.load));
+  NearbyModels models(model, scene);
   const auto model_at = [&](std::span<const double> values) { return models.at(numbers_of(scene.sweep->key, values)); };
   return run_sweep({*scene.sweep, model_at, scene.modes, options.modes, options.equilibrium}, models.comm());
 }
@@ -154,7 +154,7 @@ Robustness run_robustness(const Model& model, const Scene& scene, const ProgramO
 {
   SweepSettings points;
   for (const UncertainNumber& number : scene.uncertain) points.key.push_back(number.key);
-  NearbyModels models(model, scene, comm_of(model.structure.load));
+  NearbyModels models(model, scene);
   const auto model_at = [&](std::span<const double> values) { return models.at(numbers_of(points.key, values)); };
   return find_robustness(*scene.robustness, scene.uncertain,
                          {points, model_at, scene.modes, options.modes, options.equilibrium, "robustness"},

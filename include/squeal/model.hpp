@@ -28,8 +28,8 @@ struct PartsMade
 class NearbyModels
 {
 public:
-  /// Borrows both. Parts of `model` are shared where it is on the same communicator.
-  NearbyModels(const Model& model, const Scene& scene, MPI_Comm comm);
+  /// Borrows both.
+  NearbyModels(const Model& model, const Scene& scene);
 
   /// Structure and contact with these values; all other numbers have the scene's. Collective. Error: as build_model, or
   /// they make no scene.
