@@ -1,29 +1,147 @@
-#include "squeal/algebra/pencil_factor.hpp"
-
-#include "mumps.hpp"
-#include "squeal/base/broadcast.hpp"
-#include "squeal/base/error.hpp"
-#include "symbolic_factor.hpp"
-
-#include <algorithm>
-#include <numeric>
-#include <petscsf.h>
-
+/// MUMPS (Amestoy, Duff, L'Excellent, Koster 2001) in a given order of elimination, from entries that are distributed.
+/// Every call is collective of its ranks. Its INFOG is the same on all of them, so that errors are thrown together.
+///
 /// A factor of moderate size is made whole by every rank, each of which solves its part of the right-hand sides. Shared
 /// by ranks, MUMPS adds up in the order in which messages arrive: results would change in rounding from run to run, and
 /// a restarted run would not give the straight run's numbers. A larger factor is shared, with the right-hand sides and
 /// solutions where their rows are.
+#include "squeal/algebra/pencil_factor.hpp"
+
+#include "squeal/base/broadcast.hpp"
+#include "squeal/base/error.hpp"
+#include "squeal/base/free_memory.hpp"
+#include "symbolic_factor.hpp"
+
+#include <algorithm>
+#include <dmumps_c.h>
+#include <iterator>
+#include <numeric>
+#include <petscsf.h>
+#include <string>
 
 namespace squeal
 {
+
+namespace
+{
+
+/// JOB
+enum class Job : MUMPS_INT
+{
+  start = -1,
+  end = -2,
+  analyse = 1,
+  factorise = 2,
+  solve = 3,
+};
+
+/// ICNTL(number), counted from one as in MUMPS's manual.
+MUMPS_INT& control(DMUMPS_STRUC_C& mumps, int number)
+{
+  return mumps.icntl[number - 1];
+}
+
+/// INFOG(number), counted from one as in MUMPS's manual.
+MUMPS_INT information(const DMUMPS_STRUC_C& mumps, int number)
+{
+  return mumps.infog[number - 1];
+}
+
+/// INFOG(1) after the job.
+int outcome_of(DMUMPS_STRUC_C& mumps, Job job)
+{
+  mumps.job = static_cast<MUMPS_INT>(job);
+  dmumps_c(&mumps);
+  return information(mumps, 1);
+}
+
+[[noreturn]] void throw_failure(const DMUMPS_STRUC_C& mumps)
+{
+  constexpr int out_of_memory = -13;
+  if (information(mumps, 1) == out_of_memory) throw LibraryError(out_of_memory_text);
+  throw LibraryError("MUMPS, job " + std::to_string(mumps.job) +
+                     ": INFOG(1) = " + std::to_string(information(mumps, 1)) +
+                     ", INFOG(2) = " + std::to_string(information(mumps, 2)) + "; its manual lists them");
+}
+
+void run(DMUMPS_STRUC_C& mumps, Job job)
+{
+  if (outcome_of(mumps, job) < 0) throw_failure(mumps);
+}
+
+/// Factorises, and again with more memory beyond MUMPS's estimate, ICNTL(14), where delayed pivots or messages between
+/// ranks took more. Returns false if the matrix is singular.
+bool make_factor(DMUMPS_STRUC_C& mumps)
+{
+  constexpr int singular = -10, largest_increase = 2000; // [%]
+  const auto exceeds_estimate = [](int outcome)
+  { return outcome == -8 || outcome == -9 || outcome == -17 || outcome == -20; };
+  int outcome = outcome_of(mumps, Job::factorise);
+  for (MUMPS_INT& increase = control(mumps, 14); exceeds_estimate(outcome) && increase < largest_increase;
+       outcome = outcome_of(mumps, Job::factorise))
+    increase = 4 * std::max<MUMPS_INT>(increase, 0) + 10;
+  if (outcome < 0 && outcome != singular) throw_failure(mumps);
+  return outcome != singular;
+}
+
+/// Sets the controls that the options -<prefix>mat_mumps_icntl_N and -<prefix>mat_mumps_cntl_N give. Those of the
+/// matrix's format, of the counted pivots and of single solves are the program's own and not asked for.
+void set_controls_from_options(DMUMPS_STRUC_C& mumps, const char* prefix)
+{
+  constexpr std::array own = {5, 9, 13, 18, 19, 20, 21, 26, 27};
+  for (int number = 1; number <= static_cast<int>(std::size(mumps.icntl)); ++number)
+  {
+    if (std::ranges::find(own, number) != own.end()) continue;
+    auto value = static_cast<PetscInt>(control(mumps, number));
+    check(PetscOptionsGetInt(nullptr, prefix, format("-mat_mumps_icntl_%d", number).c_str(), &value, nullptr));
+    control(mumps, number) = static_cast<MUMPS_INT>(value);
+  }
+  for (std::size_t number = 1; number <= std::size(mumps.cntl); ++number)
+    check(PetscOptionsGetReal(nullptr, prefix, format("-mat_mumps_cntl_%zu", number).c_str(), &mumps.cntl[number - 1],
+                              nullptr));
+}
+
+} // namespace
 
 struct PencilFactor::Parts
 {
   MPI_Comm comm = MPI_COMM_NULL;
   RowLayout layout;
-  std::vector<double> K, M; // entries at the places that either has, which MUMPS holds
-  bool whole = false;       // whether every rank makes the whole factor
-  Mumps mumps;
+  std::vector<MUMPS_INT> row{}, column{};
+  std::vector<double> K{}, M{}; // entries at the places that either has
+  bool whole = false;           // whether every rank makes the whole factor
+  bool started = false;
+  DMUMPS_STRUC_C mumps{};
+
+  Parts(const Parts&) = delete;
+  Parts& operator=(const Parts&) = delete;
+  explicit Parts(Mat A) : comm(comm_of(A)), layout(row_layout(A)) {}
+  ~Parts()
+  {
+    if (started) outcome_of(mumps, Job::end);
+    return_freed_memory();
+  }
+
+  /// Begins an instance without output. SYM = 1, for positive definite matrices, is not used: it counts no negative
+  /// pivots.
+  void begin(bool symmetric)
+  {
+    mumps.par = 1;
+    mumps.sym = symmetric ? 2 : 0;
+    mumps.comm_fortran = static_cast<MUMPS_INT>(MPI_Comm_c2f(whole ? MPI_COMM_SELF : comm));
+    run(mumps, Job::start);
+    started = true;
+    for (const int stream : {1, 2, 3}) control(mumps, stream) = -1;
+    control(mumps, 4) = 0;  // no output
+    control(mumps, 7) = 1;  // the order of elimination is given
+    control(mumps, 13) = 1; // no ScaLAPACK, since negative pivots of a root that it factors are not counted
+    control(mumps, 18) = 3; // every rank gives its share of the entries
+    mumps.n = layout.total();
+    mumps.nnz_loc = static_cast<MUMPS_INT8>(K.size());
+    mumps.irn_loc = row.data();
+    mumps.jcn_loc = column.data();
+    mumps.a_loc = K.data();
+  }
 
   /// Runs what communicates inside of MUMPS only if the ranks share one instance. Where each has its own, all agree on
   /// failures.
@@ -71,21 +189,19 @@ std::pair<Triplets, std::vector<double>> on_common_pattern(const Triplets& K, co
   return both;
 }
 
-/// Sends each row of a solution to its owner.
-void bring_to_owners(const std::vector<MUMPS_INT>& places, const Eigen::MatrixXd& solution, const RowLayout& layout,
-                     MPI_Comm comm, Eigen::MatrixXd& rows)
+/// Sends each row of a solution, at places counted from one, to its owner.
+void bring_to_owners(const std::vector<MUMPS_INT>& places, const Eigen::MatrixXd& solution, MPI_Comm comm,
+                     Eigen::MatrixXd& rows)
 {
-  std::vector<PetscSFNode> owners;
-  for (const MUMPS_INT place : places)
-  {
-    const auto next = std::upper_bound(layout.starts.begin(), layout.starts.end(), to_int(place) - 1);
-    owners.push_back(
-        {static_cast<PetscInt>(next - layout.starts.begin() - 1), static_cast<PetscInt>(place - 1 - *(next - 1))});
-  }
+  std::vector<PetscInt> from_zero;
+  for (const MUMPS_INT place : places) from_zero.push_back(place - 1);
+  PetscLayout layout = nullptr;
   Owned<PetscSF> exchange;
+  check(PetscLayoutCreateFromSizes(comm, static_cast<PetscInt>(rows.rows()), PETSC_DECIDE, 1, &layout));
   check(PetscSFCreate(comm, exchange.put()));
-  check(PetscSFSetGraph(exchange, static_cast<PetscInt>(rows.rows()), static_cast<PetscInt>(owners.size()), nullptr,
-                        PETSC_COPY_VALUES, owners.data(), PETSC_COPY_VALUES));
+  check(PetscSFSetGraphLayout(exchange, layout, static_cast<PetscInt>(from_zero.size()), nullptr, PETSC_COPY_VALUES,
+                              from_zero.data()));
+  check(PetscLayoutDestroy(&layout));
   for (Eigen::Index j = 0; j < solution.cols(); ++j)
   {
     check(PetscSFReduceBegin(exchange, MPI_DOUBLE, solution.col(j).data(), rows.col(j).data(), MPI_REPLACE));
@@ -108,11 +224,9 @@ EliminationOrder elimination_order(Mat K)
 }
 
 PencilFactor::PencilFactor(Mat K, Mat M, Keep keep, const PencilOptions& options, const EliminationOrder* known)
-    : parts_(std::make_unique<Parts>())
+    : parts_(std::make_unique<Parts>(K))
 {
   Parts& parts = *parts_;
-  parts.comm = comm_of(K);
-  parts.layout = row_layout(K);
   const bool symmetric = keep != Keep::lu;
   const EliminationOrder made = known ? EliminationOrder{} : elimination_order(K), &order = known ? *known : made;
   std::vector<MUMPS_INT> positions(order.position.begin(), order.position.end());
@@ -124,17 +238,17 @@ PencilFactor::PencilFactor(Mat K, Mat M, Keep keep, const PencilOptions& options
     return parts.whole ? everywhere(std::move(own), parts.comm) : own;
   };
   auto [entries, masses] = on_common_pattern(entries_of(K), M ? entries_of(M) : Triplets{});
+  parts.row.assign(entries.row.begin(), entries.row.end());
+  parts.column.assign(entries.column.begin(), entries.column.end());
+  parts.K = std::move(entries.value);
   parts.M = std::move(masses);
-  parts.mumps =
-      start_mumps(parts.whole ? MPI_COMM_SELF : parts.comm, symmetric ? MumpsSymmetry::symmetric : MumpsSymmetry::none);
-  set_entries(parts.mumps, entries, parts.layout.total());
-  parts.K = std::move(entries.value); // MUMPS's pointer to them stays valid
-  DMUMPS_STRUC_C& mumps = *parts.mumps;
+  parts.begin(symmetric);
+  DMUMPS_STRUC_C& mumps = parts.mumps;
   control(mumps, 14) = to_int(options.room);
   if (keep == Keep::count) control(mumps, 31) = 1; // the factor is discarded, front by front
   set_controls_from_options(mumps, options.prefix);
   mumps.perm_in = positions.data();
-  parts.run_together([&] { run(mumps, MumpsJob::analyse); });
+  parts.run_together([&] { run(mumps, Job::analyse); });
   mumps.perm_in = nullptr;
 }
 
@@ -153,28 +267,28 @@ bool PencilFactor::factorise(double shift)
   Parts& parts = *parts_;
   std::vector<double> values(parts.K.size());
   for (std::size_t k = 0; k < values.size(); ++k) values[k] = parts.K[k] - shift * parts.M[k];
-  parts.mumps->a_loc = values.data();
+  parts.mumps.a_loc = values.data();
   bool regular = false;
-  parts.run_together([&] { regular = squeal::factorise(*parts.mumps); });
-  parts.mumps->a_loc = nullptr;
+  parts.run_together([&] { regular = make_factor(parts.mumps); });
+  parts.mumps.a_loc = nullptr;
   return regular;
 }
 
 int PencilFactor::negative_pivots() const
 {
-  return number_of_negative_pivots(*parts_->mumps);
+  return information(parts_->mumps, 12);
 }
 
 double PencilFactor::entries() const
 {
-  const int number = information(*parts_->mumps, 29); // a negative one counts millions
+  const int number = information(parts_->mumps, 29); // a negative one counts millions
   return number < 0 ? -1e6 * number : number;
 }
 
 double PencilFactor::foreseen_memory() const
 {
   constexpr double megabyte = 1e6;
-  return megabyte * (information(*parts_->mumps, 17) + 1); // it is rounded down
+  return megabyte * (information(parts_->mumps, 17) + 1); // it is rounded down
 }
 
 MultiVector PencilFactor::solve(const MultiVector& X) const
@@ -182,7 +296,7 @@ MultiVector PencilFactor::solve(const MultiVector& X) const
   Parts& parts = *parts_;
   MultiVector Y = X;
   if (X.columns() == 0) return Y;
-  control(*parts.mumps, 27) = to_int(X.columns()); // all of them at each reading of the factor
+  control(parts.mumps, 27) = to_int(X.columns()); // all of them at each reading of the factor
   parts.whole || ranks_of(parts.comm) == 1 ? solve_by_columns(parts, Y) : solve_by_rows(parts, Y);
   return Y;
 }
@@ -197,14 +311,14 @@ void PencilFactor::solve_by_columns(Parts& parts, MultiVector& Y)
   for (int j = 0; j < columns; ++j)
     MPI_Gatherv(Y.entries.col(j).data(), rows, MPI_DOUBLE, whole(j), parts.layout.counts.data(),
                 parts.layout.starts.data(), MPI_DOUBLE, j % ranks, parts.comm);
-  DMUMPS_STRUC_C& mumps = *parts.mumps;
+  DMUMPS_STRUC_C& mumps = parts.mumps;
   mumps.rhs = right.data();
   mumps.nrhs = to_int(right.cols());
   mumps.lrhs = parts.layout.total();
   parts.run_together(
       [&]
       {
-        if (mumps.nrhs > 0) run(mumps, MumpsJob::solve);
+        if (mumps.nrhs > 0) run(mumps, Job::solve);
       });
   for (int j = 0; j < columns; ++j)
     MPI_Scatterv(whole(j), parts.layout.counts.data(), parts.layout.starts.data(), MPI_DOUBLE, Y.entries.col(j).data(),
@@ -214,7 +328,7 @@ void PencilFactor::solve_by_columns(Parts& parts, MultiVector& Y)
 /// All ranks solve all columns with the factor that they share. The solution comes in the rows that MUMPS chooses.
 void PencilFactor::solve_by_rows(Parts& parts, MultiVector& Y)
 {
-  DMUMPS_STRUC_C& mumps = *parts.mumps;
+  DMUMPS_STRUC_C& mumps = parts.mumps;
   const int columns = to_int(Y.columns()), first = parts.layout.starts[static_cast<std::size_t>(rank_of(parts.comm))];
   std::vector<MUMPS_INT> own(static_cast<std::size_t>(Y.entries.rows()));
   std::iota(own.begin(), own.end(), first + 1);
@@ -231,9 +345,9 @@ void PencilFactor::solve_by_rows(Parts& parts, MultiVector& Y)
   mumps.lsol_loc = share;
   mumps.isol_loc = places.data();
   mumps.sol_loc = solution.data();
-  run(mumps, MumpsJob::solve);
+  run(mumps, Job::solve);
   places.resize(static_cast<std::size_t>(mumps.info[22]));
-  bring_to_owners(places, solution, parts.layout, parts.comm, Y.entries);
+  bring_to_owners(places, solution, parts.comm, Y.entries);
 }
 
 } // namespace squeal
