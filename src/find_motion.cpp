@@ -296,7 +296,10 @@ void seek_from_settled(MotionSearch& search, const char* name)
   FittedCycle fitted = seek_cycle(search, name, settings);
   LimitCycle& cycle = fitted.cycle;
   if (cycle.cut_short) motion.cycle.cut_short = true; // whether it attracts is not known: the settled motion is
-  if (cycle.cut_short || cycle.outcome.kind != OutcomeKind::converged) return;
+  const OutcomeKind kind = cycle.outcome.kind;
+  if (kind == OutcomeKind::unstable_cycle || kind == OutcomeKind::not_periodic) // what has settled there is no cycle
+    leave_to_finer_steps(motion.settled, cycle.outcome.reason);
+  if (cycle.cut_short || kind != OutcomeKind::converged) return;
   cycle.convergence.periods += motion.cycle.convergence.periods + static_cast<int>(settled.examined.periods());
   take(std::move(fitted), motion);
   motion.settled = not_run<SettledMotion>(OutcomeKind::skipped, "it is the cycle, which is the answer");

@@ -195,7 +195,7 @@ Refinement refine(FineShooting& shooting, double accuracy, const CycleAtSteps& c
   {
     if (const StageEnding ending = shooting.shoot_extrapolated(beyond, steps); ending != StageEnding::converged)
     {
-      result.leaves = !result.finer && ending != StageEnding::stalled;
+      result.leaves = !result.finer && (ending != StageEnding::stalled || shooting.multisecant().exact);
       result.reason = format("the accuracy was not reached in %ld periods of the full model at more steps a period",
                              shooting.convergence().periods);
       return result;
@@ -232,7 +232,7 @@ Refinement refine(FineShooting& shooting, double accuracy, const CycleAtSteps& c
 LimitCycle left(LimitCycle cycle, Vec equilibrium)
 {
   constexpr double smaller = 0.9; // than the cycle, about the equilibrium: contact opens no further
-  cycle.outcome.kind = OutcomeKind::not_converged;
+  cycle.outcome.kind = OutcomeKind::not_periodic;
   cycle.outcome.reason = format("a cycle at %d steps a period that finer ones do not know", cycle.steps_per_period);
   cycle.free = copy_of(cycle.orbit);
   check(VecScale(cycle.free.state, smaller));

@@ -135,11 +135,14 @@ SeenGrowth growth_of(const BesideMotion& motion, std::vector<double> distances, 
 
 } // namespace
 
-bool is_left_open_by_largest(const Multipliers& multipliers)
+bool is_left_open_by_one(const Multipliers& multipliers)
 {
   if (multipliers.stability != Stability::undecided || !multipliers.complete) return false;
-  for (std::size_t i = 1; i < multipliers.values.size(); ++i)
-    if (multipliers.values[i] != std::conj(multipliers.values[0]) && !(multipliers.upper_bound(i) < 1)) return false;
+  const std::size_t place = deciding_place(multipliers);
+  for (std::size_t i = 0; i < multipliers.values.size(); ++i)
+    if (i != place && multipliers.values[i] != std::conj(multipliers.values[place]) &&
+        !(multipliers.upper_bound(i) < 1))
+      return false;
   return true;
 }
 
@@ -157,7 +160,8 @@ std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceL
 {
   std::vector<SeenGrowth> seen;
   if (!floquet.fastest.real.get() || floquet.multipliers.values.empty()) return seen;
-  const double largest = std::abs(floquet.multipliers.values.front()), bar = floquet.multipliers.errors.front();
+  const std::size_t place = deciding_place(floquet.multipliers);
+  const double followed = std::abs(floquet.multipliers.values[place]), bar = floquet.multipliers.errors[place];
   double part = first_part, highest = 1. / 3;
   for (int k = 0; k < most_motions; ++k)
   {
@@ -168,9 +172,11 @@ std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceL
     if (now.periods > 0 && !seen.empty())
       now.error += std::abs(now.growth - seen.back().growth) * smaller / (1 - smaller);
     const bool unstable = floquet.multipliers.stability == Stability::unstable;
+    if (now.periods == 0 && now.growth < 1 && floquet.multipliers.stability == Stability::stable)
+      break; // it has come back
     if (now.periods > 0 || unstable) seen.push_back(now);
     if (unstable) break;
-    if (now.periods > 0 && std::abs(now.growth - largest) <= now.error + bar) break;
+    if (now.periods > 0 && std::abs(now.growth - followed) <= now.error + bar) break;
     highest = part;
     part *= smaller;
     if (part < 100 * orbit.residual) break; // no part that the orbit's own error does not hide
@@ -182,12 +188,16 @@ void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipli
 {
   if (seen.empty()) return;
   const SeenGrowth& nearest = seen.back();
-  if (multipliers.stability == Stability::stable && nearest.growth - nearest.error > 1)
+  const std::size_t place = deciding_place(multipliers);
+  const std::complex<double> followed = multipliers.values[place];
+  const bool stays_away = nearest.growth + nearest.error > 1 &&
+                          std::abs(nearest.growth - std::abs(followed)) > nearest.error + multipliers.errors[place];
+  if (multipliers.stability == Stability::stable && stays_away)
   {
     multipliers.stability = Stability::undecided;
-    multipliers.would_decide = format("by its multipliers it attracts, but a motion beside it was seen to grow %.4g "
-                                      "times a period: more -cycle_multipliers, or other steps a period",
-                                      nearest.growth);
+    multipliers.would_decide = format("by its multipliers it attracts, but a motion that began %.2g %% beside it was "
+                                      "seen to grow %.4g times a period: other steps a period",
+                                      100 * nearest.part, nearest.growth);
     return;
   }
   if (multipliers.stability == Stability::unstable && !(nearest.growth - nearest.error > 1))
@@ -198,13 +208,13 @@ void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipli
         format("small motions grow %.4g times a period by the tangent, but one that began %.2g %% beside the cycle "
                "grows %.4g times: contact that only just opens, closes or sticks; other steps a period, or "
                "-cycle_watched_periods",
-               std::abs(multipliers.values.front()), 100 * nearest.part, nearest.growth);
+               std::abs(followed), 100 * nearest.part, nearest.growth);
     return;
   }
   if (multipliers.stability != Stability::undecided) return;
   const bool grows = nearest.growth > 1;
-  if (!grows && !is_left_open_by_largest(multipliers)) return;
-  const double of_grid = moved_by_grid(multipliers, multipliers.values.front());
+  if (!grows && !is_left_open_by_one(multipliers)) return;
+  const double of_grid = moved_by_grid(multipliers, followed);
   if (of_grid > std::abs(nearest.growth - 1))
     multipliers.would_decide = format(
         "a motion beside the cycle grows %.4f times a period, but the grid of time moves a shift in time by %.1e: "
@@ -213,7 +223,7 @@ void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipli
         nearest.growth, of_grid);
   if (!(std::abs(nearest.growth - 1) > nearest.error + of_grid)) return;
   multipliers.stability = grows ? Stability::unstable : Stability::stable;
-  if (grows) multipliers.crossing = crossing_of(multipliers.values.front());
+  if (grows) multipliers.crossing = crossing_of(followed);
   multipliers.would_decide.clear();
 }
 

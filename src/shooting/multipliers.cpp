@@ -124,7 +124,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
   decide(multipliers, {true, ""});
   const auto combined = [&](const Eigen::VectorXd& y)
   { return std::move(states_of(combination(space.right, y), orbit.state).front()); };
-  result.fastest = fastest_motion(monodromy.flow, pairs.front(), combined);
+  result.fastest = fastest_motion(monodromy.flow, pairs[deciding_place(multipliers)], combined);
   return result;
 }
 
@@ -167,8 +167,9 @@ double largest_upper_bound(const Multipliers& multipliers)
 
 bool largest_reaches_across(const Multipliers& multipliers)
 {
-  return !multipliers.values.empty() &&
-         std::abs(std::abs(multipliers.values.front()) - 1) <= multipliers.errors.front();
+  if (multipliers.values.empty()) return false;
+  const std::size_t place = deciding_place(multipliers);
+  return std::abs(std::abs(multipliers.values[place]) - 1) <= multipliers.errors[place];
 }
 
 FloquetAnalysis find_multipliers(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit)

@@ -78,13 +78,16 @@ StageResult shoot_by_multisecant(const OrbitProblem& problem, const ShootingOpti
   Orbit orbit = copy_of(start);
   Owned<Vec> defect = preconditioned(problem, orbit.period, orbit.defect);
   // near a solution each exact step is far better than the last
-  const PetscInt patience = multisecant.exact ? 5 : options.stall;
+  const PetscInt patience = multisecant.exact ? 8 : options.stall;
   int since_best = 0;
   while (best.orbit.residual > problem.tolerance)
   {
     BorderedVector step = step_from(problem, options, multisecant, orbit, defect);
     if (meets_target(problem, multisecant, orbit, step)) return {std::move(orbit), StageEnding::converged};
     if (log.convergence.periods >= options.max_periods || since_best >= patience) return best;
+    // whole steps may go to and fro across a kink of the flow, where an event of contact passes from one step to
+    // another
+    if (multisecant.exact) scale(1. / (1 + std::min(since_best, 2)), step);
     if (!admissible_period(problem, orbit.period + step.period))
     {
       best.ending = StageEnding::period_left_range;

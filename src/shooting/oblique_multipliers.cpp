@@ -389,7 +389,7 @@ FloquetAnalysis multipliers_by_projection(const Monodromy& monodromy, PetscInt c
   if (passes.pairs.empty()) return result;
   const auto combined = [&](const Eigen::VectorXd& y)
   { return std::move(states_of(combination(passes.space.V, y), orbit.state).front()); };
-  result.fastest = fastest_motion(monodromy.flow, passes.pairs[order.front()], combined);
+  result.fastest = fastest_motion(monodromy.flow, passes.pairs[order[deciding_place(multipliers)]], combined);
   return result;
 }
 

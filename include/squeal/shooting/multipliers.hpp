@@ -76,7 +76,7 @@ std::size_t deciding_place(const Multipliers& multipliers);
 /// that the grid of time lowers may reach across.
 double largest_upper_bound(const Multipliers& multipliers);
 
-/// Whether the bar of the largest holds 1.
+/// Whether the bar of the deciding one holds 1.
 bool largest_reaches_across(const Multipliers& multipliers);
 
 /// The motion of the largest multiplier: Re(z (real + i imaginary)), z multiplied by it in every period. No other phase
@@ -86,7 +86,7 @@ struct FastestMotion
   Owned<Vec> real, imaginary; // null: none was examined; the imaginary part alone: the multiplier is real
 };
 
-/// The multipliers and the motion that grows most.
+/// The multipliers and the motion of the one that decides.
 struct FloquetAnalysis
 {
   Multipliers multipliers;
