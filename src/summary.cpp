@@ -138,7 +138,7 @@ std::vector<PartMass> masses_of(const Mesh& mesh, const Scene& scene)
     const auto place = static_cast<std::size_t>(element.part);
     const double thickness = is_shell(element.shape) ? scene.parts[place].thickness : 1;
     parts[place].mass += scene.parts[place].material.density * thickness *
-                         measure_of(element, position_matrix(positions_of(mesh, element)));
+                         measure_of(element, position_matrix(positions_of(mesh, nodes_of(element))));
   }
   return parts;
 }

@@ -38,12 +38,10 @@ std::vector<idx_t> nested_dissection(Graph graph, std::vector<idx_t> weights)
   idx_t size = graph.nodes();
   if (size == 0) return position;
   graph.neighbours.reserve(1); // METIS takes no null pointer
-  const auto dissect = [&]
-  {
-    return METIS_NodeND(&size, graph.offsets.data(), graph.neighbours.data(), weights.data(), options.data(),
-                        order.data(), position.data());
-  };
-  if (without_losing_signals(METIS_OK, dissect) != METIS_OK) throw LibraryError("METIS found no elimination order");
+  const Finally waiting = without_sigterm();
+  if (METIS_NodeND(&size, graph.offsets.data(), graph.neighbours.data(), weights.data(), options.data(), order.data(),
+                   position.data()) != METIS_OK)
+    throw LibraryError("METIS found no elimination order");
   return position;
 }
 

@@ -45,9 +45,8 @@ constexpr std::array<std::pair<int, const char*>, 6> ending_signals = {{{SIGTERM
 struct Control
 {
   RunLimits limits;
-  Clock::time_point begun = Clock::now(), last_checkpoint = begun, last_agreed = begun;
-  int every = 1, since = 0; // calls of end_is_asked() between two agreements
-  int ended_by = 0;         // agreed: a signal's number, or by_time_limit
+  Clock::time_point begun = Clock::now(), last_checkpoint = begun;
+  int ended_by = 0; // agreed: a signal's number, or by_time_limit
   bool checkpoint_due = false;
   bool undisturbed = false; // nothing is asked
 };
@@ -82,19 +81,15 @@ void agree_on_requests(MPI_Comm comm)
   Control& own = control();
   int rank = 0;
   MPI_Comm_rank(comm, &rank);
-  std::array<int, 3> known = {std::max(static_cast<int>(signal_received), own.ended_by), 0, 1};
+  std::array<int, 2> known = {std::max(static_cast<int>(signal_received), own.ended_by), 0};
   if (rank == 0)
   {
     if (known[0] == 0 && time_is_up()) known[0] = by_time_limit;
     known[1] = seconds_since(own.last_checkpoint) >= own.limits.checkpoint_interval;
-    known[2] = seconds_since(own.last_agreed) < 1e-3 * std::max(own.since, 1) ? 16 : 1;
-    own.last_agreed = Clock::now();
   }
-  MPI_Allreduce(MPI_IN_PLACE, known.data(), 3, MPI_INT, MPI_MAX, comm);
+  MPI_Allreduce(MPI_IN_PLACE, known.data(), 2, MPI_INT, MPI_MAX, comm);
   own.ended_by = std::max(own.ended_by, known[0]);
   own.checkpoint_due = own.checkpoint_due || known[1] != 0;
-  own.every = known[2];
-  own.since = 0;
 }
 
 } // namespace
@@ -132,7 +127,7 @@ bool end_is_asked(MPI_Comm comm)
   MPI_Comm_size(comm, &ranks);
   MPI_Comm_size(MPI_COMM_WORLD, &all);
   if (ranks < all) return false; // the other ranks would not know, and would agree at another time
-  if (++own.since >= own.every) agree_on_requests(comm);
+  agree_on_requests(comm);
   return own.ended_by != 0;
 }
 
@@ -142,13 +137,13 @@ Finally undisturbed()
   return Finally([] { control().undisturbed = false; });
 }
 
-int without_losing_signals(int success, const std::function<int()>& metis)
+Finally without_sigterm()
 {
-  constexpr int most = 4; // signals in a row
-  int code = metis();
-  for (int again = 0; code != success && again < most; ++again)
-    if (code = metis(); code == success) note_signal(SIGTERM);
-  return code;
+  sigset_t term, before;
+  sigemptyset(&term);
+  sigaddset(&term, SIGTERM);
+  sigprocmask(SIG_BLOCK, &term, &before);
+  return Finally([before] { sigprocmask(SIG_SETMASK, &before, nullptr); });
 }
 
 void join_parts(MPI_Comm comm)

@@ -1,12 +1,11 @@
 /// Extraction of the scene's parts, surfaces and groups from the element blocks of a mesh file.
 ///
-/// Orientation: the volume enclosed by the corner faces of a solid follows from the divergence theorem,
-///     V = 1/6 sum (a - c) . ((b - a) x (d - a))   over triangles a b d, c the centre.
-/// A negative V means that the element is numbered inside out; it is then mirrored. A surface face is mirrored where
-/// needed so that it is counter-clockwise seen from outside the solid that has the same corners.
+/// An element whose Jacobian is negative at its middle is numbered inside out; it is then mirrored. A surface face is
+/// mirrored where needed so that it is counter-clockwise seen from outside the solid that has the same corners.
 #include "squeal/mesh/mesh_file.hpp"
 
 #include "squeal/base/error.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 #include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>
@@ -36,22 +35,15 @@ std::string remedy(int gmsh_type)
   }
 }
 
-/// Six times the volume that the element's corner faces enclose [m3]; negative if it is numbered inside out.
-double six_volumes(const Element& element, const std::vector<Vec3>& nodes)
+/// Whether the Jacobian at the middle of a solid is negative.
+bool is_inside_out(const Element& element, const Mesh& mesh)
 {
-  double sum = 0;
-  const int corners = corner_count(element.shape);
-  Vec3 centre{};
-  for (int i = 0; i < corners; ++i) centre = centre + (1. / corners) * nodes[element.nodes[i]];
-  for (const auto& face : corner_faces(element.shape))
-    for (int i = 1; i < 3 && face[i + 1] >= 0; ++i)
-    {
-      const Vec3& a = nodes[element.nodes[face[0]]];
-      const Vec3& b = nodes[element.nodes[face[i]]];
-      const Vec3& d = nodes[element.nodes[face[i + 1]]];
-      sum += dot(a - centre, cross(b - a, d - a));
-    }
-  return sum;
+  const std::vector<Eigen::Vector3d> corners = natural_positions(element.shape);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& corner : corners) middle += corner / static_cast<double>(corners.size());
+  const NodePositions x = position_matrix(positions_of(mesh, nodes_of(element)));
+  const Eigen::Matrix3d J = shape_functions(element.shape, middle).dN * x.transpose();
+  return J.determinant() < 0;
 }
 
 /// Reverses the orientation of an element or a face.
@@ -81,8 +73,8 @@ int part_of(const ElementBlock& block, const Scene& scene)
 
 void add_elements(const ElementBlock& block, int part, const Scene& scene, Mesh& mesh)
 {
-  const std::optional<Shape> shape = element_shape(block.type);
-  if (!shape)
+  const std::optional<Shape> shape = shape_of(block.type);
+  if (!shape || dimension_of(*shape) == 1 || (is_shell(*shape) && !mid_sides(*shape).empty()))
     throw Error("part '" + scene.parts[part].name + "' has elements '" + block.type_name +
                 "', for which there is no kernel: " + remedy(block.type));
   const int n = block.nodes_per_element;
@@ -90,7 +82,7 @@ void add_elements(const ElementBlock& block, int part, const Scene& scene, Mesh&
   {
     Element element{*shape, part, {}};
     std::copy_n(block.nodes.begin() + first, n, element.nodes.begin());
-    if (!is_shell(*shape) && six_volumes(element, mesh.nodes) < 0) mirror(element);
+    if (!is_shell(*shape) && is_inside_out(element, mesh)) mirror(element);
     mesh.elements.push_back(element);
   }
 }
@@ -149,15 +141,13 @@ struct ElementSide
   int solids = 0;           // number of solid elements that have these corners
 };
 
-using ElementSides = std::map<std::array<int, 4>, ElementSide>;
+using ElementSides = std::map<std::vector<int>, ElementSide>; // by their corners in ascending order
 
-/// The key of ElementSides: corners in ascending order, after a -1 for a triangle.
-std::array<int, 4> sorted_corners(const std::vector<int>& corners)
+std::vector<int> ascending(std::span<const int> nodes)
 {
-  std::array<int, 4> key{-1, -1, -1, -1};
-  std::copy(corners.begin(), corners.end(), key.begin());
-  std::sort(key.begin(), key.end());
-  return key;
+  std::vector<int> sorted(nodes.begin(), nodes.end());
+  std::ranges::sort(sorted);
+  return sorted;
 }
 
 /// Returns the sides of elements all of whose corners are marked. The others are many and never looked up.
@@ -167,20 +157,14 @@ ElementSides marked_sides(const Mesh& mesh, const std::vector<char>& marked)
   const auto add = [&](const std::vector<int>& corners, int solids)
   {
     if (!std::all_of(corners.begin(), corners.end(), [&](int node) { return marked[node]; })) return;
-    ElementSide& side = sides[sorted_corners(corners)];
+    ElementSide& side = sides[ascending(corners)];
     if (!side.solids) side.corners = corners;
     side.solids += solids;
   };
   for (const Element& element : mesh.elements)
   {
     if (is_shell(element.shape)) add({element.nodes.begin(), element.nodes.begin() + corner_count(element.shape)}, 0);
-    for (const auto& face : corner_faces(element.shape))
-    {
-      std::vector<int> corners;
-      for (const int i : face)
-        if (i >= 0) corners.push_back(element.nodes[i]);
-      add(corners, 1);
-    }
+    for (const std::vector<int>& corners : faces_of(element)) add(corners, 1);
   }
   return sides;
 }
@@ -214,7 +198,7 @@ UsedSurfaces used_surfaces(const Scene& scene)
 void add_faces(const ElementBlock& block, const std::string& name, const UsedSurfaces& used, const ElementSides& sides,
                Mesh& mesh)
 {
-  const std::optional<FaceShape> shape = face_shape(block.type);
+  const std::optional<Shape> shape = shape_of(block.type);
   if (!shape)
   {
     if (!used.all.count(name)) return;
@@ -228,7 +212,7 @@ void add_faces(const ElementBlock& block, const std::string& name, const UsedSur
   {
     Face face{*shape, {}, false};
     std::copy_n(block.nodes.begin() + first, n, face.nodes.begin());
-    const auto side = sides.find(sorted_corners({face.nodes.begin(), face.nodes.begin() + corners}));
+    const auto side = sides.find(ascending(std::span(face.nodes).first(corners)));
     if (side == sides.end())
     {
       ++without_element;
@@ -273,9 +257,8 @@ void check_doubles(const Mesh& mesh, const Scene& scene)
   std::map<std::vector<int>, const Element*> known; // by their ascending corners
   for (const Element& element : mesh.elements)
   {
-    std::vector<int> corners(element.nodes.begin(), element.nodes.begin() + corner_count(element.shape));
-    std::sort(corners.begin(), corners.end());
-    const auto [twin, is_new] = known.emplace(std::move(corners), &element);
+    const auto [twin, is_new] =
+        known.emplace(ascending(std::span(element.nodes).first(corner_count(element.shape))), &element);
     if (!is_new)
       throw Error(named_part(*twin->second, scene) + " and " + named_part(element, scene) +
                   " have two elements on the same nodes, at " +
@@ -293,9 +276,8 @@ std::vector<std::array<int, 3>> edges_of(const Element& element)
   int middle = corner_count(element.shape);
   for (const auto& [a, b] : mid_sides(element.shape)) add(element.nodes[a], element.nodes[b], element.nodes[middle++]);
   if (!edges.empty()) return edges;
-  for (const auto& face : corner_faces(element.shape))
-    for (int i = 0, count = face[3] < 0 ? 3 : 4; i < count; ++i)
-      add(element.nodes[face[i]], element.nodes[face[(i + 1) % count]], -1);
+  for (const std::vector<int>& face : faces_of(element))
+    for (std::size_t i = 0; i < face.size(); ++i) add(face[i], face[(i + 1) % face.size()], -1);
   return edges;
 }
 

@@ -192,7 +192,7 @@ void set_slave_parts(const ContactSurface& slave, std::vector<SlaveRow>& rows)
   for (const Face& face : slave.faces)
   {
     auto mid = static_cast<std::size_t>(corner_count(face.shape));
-    for (const auto& [a, b] : side_ends(face.shape))
+    for (const auto& [a, b] : mid_sides(face.shape))
     {
       const int node = face.nodes[mid++];
       SlaveRow& row = rows[slave.place_of(node)];
@@ -224,14 +224,11 @@ ContactSurface contact_surface(const Mesh& mesh, const std::string& name, const 
   surface.nodes = nodes_of_faces(surface.faces);
   for (const Face& face : surface.faces)
   {
-    std::vector<Vec3> x;
-    for (const int node : nodes_of(face)) x.push_back(mesh.nodes[node]);
-    surface.placed.push_back({.shape = face.shape, .x = position_matrix(x), .two_sided = face.of_shell});
+    surface.placed.push_back(
+        {.shape = face.shape, .x = position_matrix(positions_of(mesh, nodes_of(face))), .two_sided = face.of_shell});
   }
   set_normals(surface, set_patches(surface));
-  std::vector<Vec3> places;
-  for (const int node : surface.nodes) places.push_back(mesh.nodes[node]);
-  surface.size = diagonal_of(places);
+  surface.size = diagonal_of(positions_of(mesh, surface.nodes));
   return surface;
 }
 

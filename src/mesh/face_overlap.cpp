@@ -47,7 +47,7 @@ double twice_area(const Polygon& polygon)
 }
 
 /// The corners of a face in the plane, counter-clockwise.
-Polygon corners_of(FaceShape shape, const NodePositions& x)
+Polygon corners_of(Shape shape, const NodePositions& x)
 {
   Polygon polygon;
   for (int i = 0; i < corner_count(shape); ++i) polygon.emplace_back(x.col(i).head<2>());
@@ -78,7 +78,7 @@ Polygon clip(Polygon polygon, const Polygon& window)
 }
 
 /// The shape functions of a face at a point of the plane.
-ShapeFunctions functions_at(FaceShape shape, const NodePositions& x, const PlanePoint& point, double size)
+ShapeFunctions functions_at(Shape shape, const NodePositions& x, const PlanePoint& point, double size)
 {
   constexpr double rounding = 1e-15;
   constexpr int most = 20; // three are enough on any face without a corner of 180 degrees
@@ -218,19 +218,11 @@ bool oppose(const SlaveInPlane& slave, const PlacedFace& master, const NodePosit
 
 } // namespace
 
-std::span<const std::array<int, 2>> side_ends(FaceShape shape)
-{
-  static constexpr std::array<int, 2> triangle[] = {{0, 1}, {1, 2}, {2, 0}}, quad[] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}};
-  if (shape == FaceShape::triangle6) return triangle;
-  if (shape == FaceShape::quad8) return quad;
-  return {};
-}
-
-FaceValues multiplier_functions(FaceShape shape, const FaceValues& N)
+FaceValues multiplier_functions(Shape shape, const FaceValues& N)
 {
   FaceValues chi = N;
   auto mid = Eigen::Index{corner_count(shape)};
-  for (const auto& [a, b] : side_ends(shape))
+  for (const auto& [a, b] : mid_sides(shape))
   {
     chi(a) += N(mid) / 4;
     chi(b) += N(mid) / 4;

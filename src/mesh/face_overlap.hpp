@@ -11,15 +11,12 @@ using FaceMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::
 /// The multipliers' functions chi from the shape functions of a face: chi = phi for linear faces. For quadratic ones a
 /// corner takes a quarter of its two mid-sides, and a mid-side keeps half. They are not negative on triangles, and
 /// their integrals are positive.
-FaceValues multiplier_functions(FaceShape shape, const FaceValues& N);
-
-/// The ends of the side of each mid-side node.
-std::span<const std::array<int, 2>> side_ends(FaceShape shape);
+FaceValues multiplier_functions(Shape shape, const FaceValues& N);
 
 /// A face with its nodes and what stands of it beside the plane through its corners.
 struct PlacedFace
 {
-  FaceShape shape{};
+  Shape shape{};
   NodePositions x;                                  // [m]
   Eigen::Vector3d normal = Eigen::Vector3d::Zero(); // [-] outward, mean over the face
   double slack = 0;       // [m] how far the face may stand off the curved surface for which it stands

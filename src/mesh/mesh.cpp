@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <array>
 #include <Eigen/Geometry>
+#include <ranges>
 #include <set>
 
 namespace squeal
@@ -23,9 +24,13 @@ namespace squeal
 namespace
 {
 
-template <class Map> void add_keys(const Map& map, std::vector<std::string>& names)
+/// Names nothing of these maps: one whose name is near may be meant.
+template <class... Maps>
+[[noreturn]] void refuse_name(const std::string& what, const std::string& name, const Maps&... maps)
 {
-  for (const auto& [name, value] : map) names.push_back(name);
+  std::vector<std::string> known;
+  (std::ranges::copy(maps | std::views::keys, std::back_inserter(known)), ...);
+  throw Error(what + spelling_hint(name, known));
 }
 
 /// Nodes of a surface and of a volume of one name are those of the volume: a support would hold all of it.
@@ -196,9 +201,7 @@ double diagonal_of(const std::vector<Vec3>& nodes)
 int point_node(const Mesh& mesh, const std::string& name, const std::string& user)
 {
   if (const auto point = mesh.points.find(name); point != mesh.points.end()) return point->second;
-  std::vector<std::string> known;
-  add_keys(mesh.points, known);
-  throw Error(user + ": there is no point, rigid body or coupling \"" + name + "\"" + spelling_hint(name, known));
+  refuse_name(user + ": there is no point, rigid body or coupling \"" + name + "\"", name, mesh.points);
 }
 
 std::vector<int> named_nodes(const Mesh& mesh, const std::string& name, const std::string& user)
@@ -209,18 +212,14 @@ std::vector<int> named_nodes(const Mesh& mesh, const std::string& name, const st
     check_one_meaning(mesh, name, user);
     return group->second;
   }
-  std::vector<std::string> known;
-  add_keys(mesh.points, known);
-  add_keys(mesh.node_groups, known);
-  throw Error(user + ": there is no point, rigid body or mesh group \"" + name + "\"" + spelling_hint(name, known));
+  refuse_name(user + ": there is no point, rigid body or mesh group \"" + name + "\"", name, mesh.points,
+              mesh.node_groups);
 }
 
 const std::vector<Face>& named_faces(const Mesh& mesh, const std::string& name, const std::string& user)
 {
   if (const auto surface = mesh.surfaces.find(name); surface != mesh.surfaces.end()) return surface->second;
-  std::vector<std::string> known;
-  add_keys(mesh.surfaces, known);
-  throw Error(user + " on \"" + name + "\": the mesh has no such surface" + spelling_hint(name, known));
+  refuse_name(user + " on \"" + name + "\": the mesh has no such surface", name, mesh.surfaces);
 }
 
 std::string node_text(int node, const Vec3& position)

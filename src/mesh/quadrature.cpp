@@ -103,9 +103,9 @@ Rule four_point_tetrahedron()
 }
 
 /// Evaluates each shape's functions at the points of its rule.
-template <class Key> std::map<Key, Quadrature> with_shape_functions(const std::map<Key, Rule>& rules)
+std::map<Shape, Quadrature> with_shape_functions(const std::map<Shape, Rule>& rules)
 {
-  std::map<Key, Quadrature> result;
+  std::map<Shape, Quadrature> result;
   for (const auto& [shape, rule] : rules)
     for (const auto& [xi, weight] : rule) result[shape].push_back({xi, weight, shape_functions(shape, xi)});
   return result;
@@ -115,25 +115,27 @@ template <class Key> std::map<Key, Quadrature> with_shape_functions(const std::m
 
 const Quadrature& stiffness_rule(Shape shape)
 {
-  static const auto rules = with_shape_functions<Shape>({{Shape::hex8, cube(2)},
-                                                         {Shape::hex20, cube(3)},
-                                                         {Shape::wedge6, extruded(inner_triangle(), 2)},
-                                                         {Shape::tet10, four_point_tetrahedron()},
-                                                         {Shape::tet4, {{{0.25, 0.25, 0.25}, 1. / 6}}},
-                                                         {Shape::shell4, square(2)},
-                                                         {Shape::shell3, mid_side_triangle()}});
+  static const auto rules = with_shape_functions({{Shape::hex8, cube(2)},
+                                                  {Shape::hex20, cube(3)},
+                                                  {Shape::wedge6, extruded(inner_triangle(), 2)},
+                                                  {Shape::tet10, four_point_tetrahedron()},
+                                                  {Shape::tet4, {{{0.25, 0.25, 0.25}, 1. / 6}}},
+                                                  {Shape::quad4, square(2)},
+                                                  {Shape::triangle3, mid_side_triangle()}});
   return rules.at(shape);
 }
 
 const Quadrature& mass_rule(Shape shape)
 {
-  static const auto rules = with_shape_functions<Shape>({{Shape::hex8, cube(3)},
-                                                         {Shape::hex20, cube(3)},
-                                                         {Shape::wedge6, extruded(collapsed_triangle(3), 3)},
-                                                         {Shape::tet10, collapsed_tetrahedron(4)},
-                                                         {Shape::tet4, four_point_tetrahedron()},
-                                                         {Shape::shell4, square(3)},
-                                                         {Shape::shell3, collapsed_triangle(3)}});
+  static const auto rules = with_shape_functions({{Shape::hex8, cube(3)},
+                                                  {Shape::hex20, cube(3)},
+                                                  {Shape::wedge6, extruded(collapsed_triangle(3), 3)},
+                                                  {Shape::tet10, collapsed_tetrahedron(4)},
+                                                  {Shape::tet4, four_point_tetrahedron()},
+                                                  {Shape::quad4, square(3)},
+                                                  {Shape::triangle3, collapsed_triangle(3)},
+                                                  {Shape::quad8, square(3)},
+                                                  {Shape::triangle6, collapsed_triangle(3)}});
   return rules.at(shape);
 }
 
@@ -144,19 +146,10 @@ const Quadrature& triangle_rule(int n)
     std::array<Quadrature, 2> result;
     for (const int points : {3, 4})
       for (const auto& [xi, weight] : collapsed_triangle(points))
-        result[points - 3].push_back({xi, weight, shape_functions(FaceShape::triangle3, xi)});
+        result[points - 3].push_back({xi, weight, shape_functions(Shape::triangle3, xi)});
     return result;
   }();
   return rules.at(n - 3);
-}
-
-const Quadrature& area_rule(FaceShape shape)
-{
-  static const auto rules = with_shape_functions<FaceShape>({{FaceShape::triangle3, collapsed_triangle(3)},
-                                                             {FaceShape::quad4, square(3)},
-                                                             {FaceShape::triangle6, collapsed_triangle(3)},
-                                                             {FaceShape::quad8, square(3)}});
-  return rules.at(shape);
 }
 
 } // namespace squeal

@@ -16,7 +16,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <ranges>
@@ -28,84 +27,38 @@ namespace
 {
 
 using Eigen::Vector3d;
-using Places = std::vector<Vector3d>; // natural coordinates
-
-/// gmsh's numbers of the lines of 2 and 3 nodes. Each is the first side of a quadrangle: nodes 0, 1 and 4.
-constexpr int line2 = 1, line3 = 8;
 
 using Pair = std::array<int, 2>;
 
 /// The corners of a child, each in the middle of two of the parent's, which may be one.
 using Child = std::vector<Pair>;
 
-/// An element type of the file.
-struct CellType
-{
-  Places corners{};
-  std::vector<Pair> sides{}; // with mid-side nodes, in their order
-  std::function<NodeValues(const Vector3d&)> values{};
-  std::vector<std::vector<Child>> middles{}; // children beside those of the corners; of a tetrahedron by the diagonal
-};
-
 /// Corners of an octahedron that are opposite each other, by the tetrahedron's sides that they halve.
 constexpr std::array<std::array<Pair, 2>, 3> diagonals = {{{{{0, 1}, {2, 3}}}, {{{0, 2}, {1, 3}}}, {{{0, 3}, {1, 2}}}}};
 
-std::vector<std::vector<Child>> middles_of(int corners, int dimension)
+/// Children beside those of the corners.
+using Middle = std::vector<Child>;
+
+/// Of a tetrahedron by the diagonal.
+std::vector<Middle> middles_of(Shape shape)
 {
   const Child triangle = {{0, 1}, {1, 2}, {2, 0}}, lower = {{0, 1}, {1, 2}, {2, 0}, {0, 4}, {1, 5}, {2, 3}},
               upper = {{0, 4}, {1, 5}, {2, 3}, {3, 4}, {4, 5}, {5, 3}};
-  std::vector<std::vector<Child>> middles;
-  if (corners == 3) middles.push_back({triangle});
-  if (corners == 6) middles.push_back({lower, upper});
-  if (corners != 4 || dimension != 3) middles.resize(1);
-  if (!middles.empty()) return middles;
+  const int corners = corner_count(shape), dimension = dimension_of(shape);
+  if (corners == 3) return {Middle{triangle}};
+  if (corners == 6) return {Middle{lower, upper}};
+  if (corners != 4 || dimension != 3) return {Middle{}};
+  std::vector<Middle> middles;
   for (std::size_t d = 0; d < 3; ++d)
   {
     const auto& [from, to] = diagonals[d];
     const auto& [a, b] = diagonals[(d + 1) % 3];
     const auto& [c, e] = diagonals[(d + 2) % 3];
     const std::array ring = {a, c, b, e};
-    std::vector<Child>& octahedron = middles.emplace_back();
+    Middle& octahedron = middles.emplace_back();
     for (std::size_t i = 0; i < 4; ++i) octahedron.push_back({from, to, ring[i], ring[(i + 1) % 4]});
   }
   return middles;
-}
-
-std::optional<CellType> cell_type(int gmsh_type, int dimension)
-{
-  static const Places brick = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
-                               {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}},
-                      simplex = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
-                      prism = {{0, 0, -1}, {1, 0, -1}, {0, 1, -1}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
-  CellType type;
-  int corners = 2; // of a line
-  if (gmsh_type == line2)
-    type.values = [](const Vector3d& xi) -> NodeValues { return shape_functions(FaceShape::quad4, xi).N.head(2); };
-  else if (gmsh_type == line3)
-  {
-    type.sides = {{0, 1}};
-    type.values = [](const Vector3d& xi) -> NodeValues {
-      return shape_functions(FaceShape::quad8, xi).N(std::array<Eigen::Index, 3>{0, 1, 4});
-    };
-  }
-  else if (const auto face = face_shape(gmsh_type))
-  {
-    corners = corner_count(*face);
-    for (int i = 0; i < node_count(*face) - corners; ++i) type.sides.push_back({i, (i + 1) % corners});
-    type.values = [shape = *face](const Vector3d& xi) { return shape_functions(shape, xi).N; };
-  }
-  else if (const auto solid = element_shape(gmsh_type))
-  {
-    corners = corner_count(*solid);
-    type.sides.assign(mid_sides(*solid).begin(), mid_sides(*solid).end());
-    type.values = [shape = *solid](const Vector3d& xi) { return shape_functions(shape, xi).N; };
-  }
-  else
-    return std::nullopt;
-  const Places& whole = corners == 6 ? prism : corners == 3 || (corners == 4 && dimension == 3) ? simplex : brick;
-  type.corners.assign(whole.begin(), whole.begin() + corners);
-  type.middles = middles_of(corners, dimension);
-  return type;
 }
 
 /// Weights of an element's nodes.
@@ -114,10 +67,11 @@ using LocalWeights = std::vector<std::pair<std::size_t, double>>;
 /// The nodes of each child.
 using Children = std::vector<std::vector<LocalWeights>>;
 
-Children children_of(const CellType& type, const std::vector<Child>& middle)
+Children children_of(Shape shape, const Middle& middle)
 {
-  const auto corners = static_cast<int>(type.corners.size());
-  std::vector<Child> all;
+  const int corners = corner_count(shape);
+  const std::vector<Vector3d> parent = natural_positions(shape);
+  Middle all;
   for (int about = 0; about < corners; ++about)
     for (Child& child = all.emplace_back(); const int corner : std::views::iota(0, corners))
       child.push_back({corner, about});
@@ -125,13 +79,13 @@ Children children_of(const CellType& type, const std::vector<Child>& middle)
   Children children;
   for (const Child& child : all)
   {
-    Places places;
-    for (const auto& [a, b] : child) places.push_back((type.corners[a] + type.corners[b]) / 2);
-    for (const auto& [a, b] : type.sides) places.push_back((places[a] + places[b]) / 2);
+    std::vector<Vector3d> places; // natural coordinates
+    for (const auto& [a, b] : child) places.emplace_back((parent[a] + parent[b]) / 2);
+    for (const auto& [a, b] : mid_sides(shape)) places.emplace_back((places[a] + places[b]) / 2);
     for (auto& nodes = children.emplace_back(); const Vector3d& place : places)
     {
       LocalWeights& weights = nodes.emplace_back();
-      const NodeValues N = type.values(place);
+      const NodeValues N = shape_functions(shape, place).N;
       for (Eigen::Index i = 0; i < N.size(); ++i)
         if (N(i) != 0) weights.emplace_back(i, N(i));
     }
@@ -177,10 +131,10 @@ private:
   std::map<NodeWeights, int> numbers_{};
 };
 
-void divide(ElementBlock& block, const CellType& type, NewNodes& numbers, const std::vector<Vec3>& places)
+void divide(ElementBlock& block, Shape shape, NewNodes& numbers, const std::vector<Vec3>& places)
 {
   std::vector<Children> children;
-  for (const std::vector<Child>& middle : type.middles) children.push_back(children_of(type, middle));
+  for (const Middle& middle : middles_of(shape)) children.push_back(children_of(shape, middle));
   const auto n = static_cast<std::size_t>(block.nodes_per_element);
   const std::vector<int> parents = std::move(block.nodes);
   block.nodes = {};
@@ -212,7 +166,7 @@ void refine(FileMesh& mesh, int times)
     mesh.parents.clear();
     NewNodes numbers(mesh);
     for (ElementBlock& block : mesh.blocks)
-      if (const auto type = cell_type(block.type, block.dimension)) divide(block, *type, numbers, mesh.nodes);
+      if (const auto shape = shape_of(block.type)) divide(block, *shape, numbers, mesh.nodes);
   }
 }
 

@@ -26,12 +26,19 @@ template <class Read> void for_each_line(const std::filesystem::path& file, Read
     read(line, file.string() + ", line " + std::to_string(number));
 }
 
-NodeMotion motion_in(const std::string& line, const std::string& place)
+/// Whether a line consists of these values.
+template <class... Values> bool reads(const std::string& line, Values&... values)
 {
   std::istringstream words(line);
+  std::string rest;
+  return (words >> ... >> values) && !(words >> rest);
+}
+
+NodeMotion motion_in(const std::string& line, const std::string& place)
+{
   NodeMotion found;
-  std::string motion, rest;
-  const bool is_form = (words >> found.node >> motion) && !(words >> rest);
+  std::string motion;
+  const bool is_form = reads(line, found.node, motion);
   const auto* const known = std::find(motion_words.begin(), motion_words.end(), motion);
   if (!is_form || (known == motion_words.end() && motion != "-"))
     throw Error(
@@ -66,11 +73,8 @@ std::vector<PlacedGap> read_gaps(const std::filesystem::path& file)
   for_each_line(file,
                 [&](const std::string& line, const std::string& place)
                 {
-                  std::istringstream words(line);
                   auto& [at, gap] = gaps.emplace_back();
-                  std::string rest;
-                  const bool is_form = (words >> at[0] >> at[1] >> at[2] >> gap) && !(words >> rest);
-                  if (!is_form || !std::isfinite(norm(at) + gap))
+                  if (!reads(line, at[0], at[1], at[2], gap) || !std::isfinite(norm(at) + gap))
                     throw Error(place + ": '" + shortened(line) + "': expected x, y, z and the gap in m");
                 });
   return gaps;
@@ -83,12 +87,9 @@ std::vector<PlacedNode> read_placed_nodes(const std::filesystem::path& file)
   for_each_line(file,
                 [&](const std::string& line, const std::string& place)
                 {
-                  std::istringstream words(line);
                   PlacedNode found;
-                  std::string rest;
-                  const bool is_form =
-                      (words >> found.node >> found.at[0] >> found.at[1] >> found.at[2]) && !(words >> rest);
-                  if (!is_form || !std::isfinite(norm(found.at)))
+                  auto& [x, y, z] = found.at;
+                  if (!reads(line, found.node, x, y, z) || !std::isfinite(norm(found.at)))
                     throw Error(place + ": '" + shortened(line) + "': expected a node's number and its x, y, z in m");
                   if (!seen.insert(found.node).second)
                     throw Error(place + ": node " + std::to_string(found.node) + " is there twice");

@@ -4,12 +4,12 @@
 /// Without a cycle it has one grid. XDMF lists an element as its code and then its nodes, in VTK's order.
 #include "files.hpp"
 #include "squeal/base/whole_file.hpp"
+#include "squeal/mesh/shapes.hpp"
 #include "squeal/report/results_folder.hpp"
 #include "squeal/solid/sparse_rows.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <sstream>
 
 namespace squeal
@@ -20,31 +20,19 @@ namespace
 
 struct XdmfShape
 {
+  Shape shape;
   int code;
-  std::vector<int> order; // of gmsh's nodes
+  std::vector<int> order{}; // of gmsh's nodes; empty: theirs
 };
 
-XdmfShape xdmf_shape(Shape shape)
-{
-  switch (shape)
-  {
-  case Shape::hex8:
-    return {9, {0, 1, 2, 3, 4, 5, 6, 7}};
-  case Shape::wedge6:
-    return {8, {0, 1, 2, 3, 4, 5}};
-  case Shape::hex20:
-    return {48, {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15}};
-  case Shape::tet4:
-    return {6, {0, 1, 2, 3}};
-  case Shape::tet10:
-    return {38, {0, 1, 2, 3, 4, 5, 6, 7, 9, 8}};
-  case Shape::shell4:
-    return {5, {0, 1, 2, 3}};
-  case Shape::shell3:
-    return {4, {0, 1, 2}};
-  }
-  throw Error("an element shape without an XDMF type");
-}
+const std::array xdmf_shapes = {
+    XdmfShape{Shape::triangle3, 4},
+    XdmfShape{Shape::quad4, 5},
+    XdmfShape{Shape::tet4, 6},
+    XdmfShape{Shape::wedge6, 8},
+    XdmfShape{Shape::hex8, 9},
+    XdmfShape{Shape::tet10, 38, {0, 1, 2, 3, 4, 5, 6, 7, 9, 8}},
+    XdmfShape{Shape::hex20, 48, {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15}}};
 
 constexpr int polyvertex = 1; // followed by its number of nodes
 
@@ -68,9 +56,10 @@ void write_mesh(Hdf5File& file, const Mesh& mesh, Layout& layout)
   std::vector<int> topology, part;
   for (const Element& element : mesh.elements)
   {
-    const XdmfShape shape = xdmf_shape(element.shape);
-    topology.push_back(shape.code);
-    for (const int k : shape.order) topology.push_back(element.nodes[static_cast<std::size_t>(k)]);
+    const auto& [shape, code, order] = *std::ranges::find(xdmf_shapes, element.shape, &XdmfShape::shape);
+    topology.push_back(code);
+    for (std::size_t k = 0; const int node : nodes_of(element))
+      topology.push_back(order.empty() ? node : element.nodes[static_cast<std::size_t>(order[k++])]);
     part.push_back(element.part);
   }
   for (const auto& [name, node] : mesh.points)
@@ -207,77 +196,47 @@ std::string xdmf_text(const Layout& layout, const std::string& run)
   return text.str();
 }
 
-/// fields.h5 while it is written. The file is rank 0's; functions are collective.
-class Fields
+/// A motion of all nodes.
+struct NodalField
 {
-public:
-  Fields(const Model& model, const std::filesystem::path& place, const std::string& run, MPI_Comm comm)
-      : model_(model), comm_(comm)
-  {
-    check(VecScatterCreateToZero(model.structure.load, scatter_.put(), whole_.put()));
-    on_rank_zero(comm, [&] { write_mesh(file_.emplace(place, run, field_sets), model.mesh, layout); });
-  }
-
-  /// Work on rank 0 alone.
-  template <class Work> void on_file(Work work)
-  {
-    on_rank_zero(comm_, [&] { work(*file_); });
-  }
-
-  /// Writes a vector of degrees of freedom as nodal displacements. `name`: of the field that ParaView shows at all
-  /// times; empty: it is none.
-  void write(Vec u, const std::string& data, const std::string& name) { write(nodal(u), data, name); }
-
-  /// Writes the displacement of nodes at rest, with what supports move them by.
-  void write_rest(Vec u, const std::string& data, const std::string& name)
-  {
-    std::vector<double> values = nodal(u);
-    for (std::size_t i = 0; i < values.size(); ++i)
-      values[i] += model_.dofs.shift_of(static_cast<PetscInt>(6 * (i / 3) + i % 3));
-    write(values, data, name);
-  }
-
-  Layout layout;
-
-private:
-  void write(const std::vector<double>& values, const std::string& data, const std::string& name)
-  {
-    on_file([&](Hdf5File& file) { file.write(data, values, 3); });
-    if (!name.empty()) layout.still.push_back({name, data, 3});
-  }
-
-  /// x y z of every node [m] on rank 0, empty elsewhere.
-  std::vector<double> nodal(Vec u) const
-  {
-    check(VecScatterBegin(scatter_, u, whole_, INSERT_VALUES, SCATTER_FORWARD));
-    check(VecScatterEnd(scatter_, u, whole_, INSERT_VALUES, SCATTER_FORWARD));
-    PetscInt size = 0;
-    check(VecGetLocalSize(whole_, &size));
-    if (size == 0) return {};
-    const PetscScalar* values = nullptr;
-    check(VecGetArrayRead(whole_, &values));
-    std::vector<double> displacement;
-    displacement.reserve(3 * model_.mesh.nodes.size());
-    for (std::size_t node = 0; node < model_.mesh.nodes.size(); ++node)
-      for (int component = 0; component < 3; ++component)
-      {
-        double sum = 0;
-        for (const DofTerm& term : model_.dofs.terms_of(static_cast<PetscInt>(6 * node) + component))
-          sum += term.factor * values[term.dof];
-        displacement.push_back(sum);
-      }
-    check(VecRestoreArrayRead(whole_, &values));
-    return displacement;
-  }
-
-  const Model& model_;
-  MPI_Comm comm_;
-  Owned<VecScatter> scatter_;
-  Owned<Vec> whole_;
-  std::optional<Hdf5File> file_; // on rank 0
+  std::string data, name;       // in the file; in ParaView at all times, empty: it is not shown
+  std::vector<double> values{}; // x y z of every node; on rank 0
 };
 
-void write_modes(Fields& fields, const Modes& modes)
+class NodalFields
+{
+public:
+  explicit NodalFields(const Model& model) : model_(model) {}
+
+  const std::vector<NodalField>& all() const { return all_; }
+
+  /// Adds a vector of degrees of freedom. Collective.
+  void add(Vec u, const std::string& data, const std::string& name)
+  {
+    NodalField& field = all_.emplace_back(data, name);
+    const std::vector<double> q = all_entries(u);
+    if (rank_of(comm_of(u)) != 0) return;
+    field.values.resize(3 * model_.mesh.nodes.size());
+    for (std::size_t i = 0; i < field.values.size(); ++i)
+      for (const DofTerm& term : model_.dofs.terms_of(nodal_dof(i)))
+        field.values[i] += term.factor * q[static_cast<std::size_t>(term.dof)];
+  }
+
+  /// Adds to the last one what supports move.
+  void add_shift()
+  {
+    std::vector<double>& values = all_.back().values;
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] += model_.dofs.shift_of(nodal_dof(i));
+  }
+
+private:
+  static PetscInt nodal_dof(std::size_t entry) { return static_cast<PetscInt>(6 * (entry / 3) + entry % 3); }
+
+  const Model& model_;
+  std::vector<NodalField> all_{};
+};
+
+void add_mode_shapes(NodalFields& fields, const Modes& modes)
 {
   int number = 0;
   for (const ComplexMode& mode : modes.modes)
@@ -287,21 +246,20 @@ void write_modes(Fields& fields, const Modes& modes)
     const std::string data = "modes/" + std::to_string(++number) + "/";
     const std::string name =
         format("%s %d, %ld Hz, ", grows ? "unstable mode" : "mode", number, std::lround(mode.frequency_hz()));
-    fields.write(mode.real, data + "real", name + "real part");
-    fields.write(mode.imaginary, data + "imaginary", name + "imaginary part");
+    fields.add(mode.real, data + "real", name + "real part");
+    fields.add(mode.imaginary, data + "imaginary", name + "imaginary part");
   }
 }
 
 constexpr Eigen::Index shown_shapes = 6; // of a settled motion in ParaView
 
-void write_motion_shapes(Fields& fields, const MotionShapes& shapes, Vec like)
+void add_motion_shapes(NodalFields& fields, const MotionShapes& shapes, Vec shape)
 {
-  const Owned<Vec> shape = zeros_like(like);
   for (Eigen::Index i = 0; i < shapes.V.columns(); ++i)
   {
     copy_column(shapes.V, i, shape);
     const std::string number = std::to_string(i + 1), data = "settled/shape_" + number;
-    fields.write(shape, data, i < shown_shapes ? "shape " + number + " of the settled motion [kg^-1/2]" : "");
+    fields.add(shape, data, i < shown_shapes ? "shape " + number + " of the settled motion [kg^-1/2]" : "");
   }
 }
 
@@ -312,46 +270,55 @@ double sample_time(const LimitCycle& cycle, std::size_t sample)
   return std::ceil(static_cast<double>(sample + 1) * steps / samples) * cycle.orbit.period / steps;
 }
 
+NodalFields nodal_fields(const Report& report, const Model& model)
+{
+  NodalFields fields(model);
+  const Owned<Vec> part = zeros_like(model.structure.load);
+  if (report.point.equilibrium.u.get())
+  {
+    fields.add(report.point.equilibrium.u, "equilibrium/displacement", "displacement at equilibrium [m]");
+    fields.add_shift();
+  }
+  add_mode_shapes(fields, report.point.modes);
+  for (std::size_t i = 0; i < 2 * report.sensitivity.modes.size(); ++i)
+  {
+    copy_column(report.sensitivity.modes[i / 2].left, i % 2, part);
+    fields.add(part, format("modes/%zu/left_%s", i / 2 + 1, i % 2 ? "imaginary" : "real"), "");
+  }
+  if (has_run(report.motion.settled.outcome)) add_motion_shapes(fields, report.motion.settled.shapes, part);
+  const std::vector<Owned<Vec>>& cycle = report.motion.cycle.measured.displacements;
+  for (std::size_t i = 0; i < cycle.size(); ++i) fields.add(cycle[i], cycle_data(i), "");
+  return fields;
+}
+
 } // namespace
 
 void write_fields(const Report& report, const Scene& scene, const Model& model, const std::filesystem::path& output,
                   MPI_Comm comm)
 {
   if (scene.matrices) return;
-  const Equilibrium& equilibrium = report.point.equilibrium;
-  const LimitCycle& cycle = report.motion.cycle;
-  Fields fields(model, output / word(ResultFile::fields), report.run, comm);
-  fields.on_file(
-      [&](Hdf5File& file)
-      {
-        write_pairs(file, equilibrium, model.interface);
-        if (!scene.probes.empty()) file.write("probes/node", probed_nodes(scene.probes, model.mesh));
-        if (equilibrium.u.get()) write_contact(file, equilibrium, model, fields.layout);
-        for (int number = 0; const ModeCauses& causes : report.sensitivity.modes)
-          file.write(format("modes/%d/pair_power", ++number), causes.pair_powers);
-      });
-  if (equilibrium.u.get())
-    fields.write_rest(equilibrium.u, "equilibrium/displacement", "displacement at equilibrium [m]");
-  write_modes(fields, report.point.modes);
-  const Owned<Vec> part = zeros_like(model.structure.load);
-  for (std::size_t i = 0; i < 2 * report.sensitivity.modes.size(); ++i)
+  const NodalFields fields = nodal_fields(report, model);
+  const auto write = [&]
   {
-    copy_column(report.sensitivity.modes[i / 2].left, i % 2, part);
-    fields.write(part, format("modes/%zu/left_%s", i / 2 + 1, i % 2 ? "imaginary" : "real"), "");
-  }
-  if (has_run(report.motion.settled.outcome))
-    write_motion_shapes(fields, report.motion.settled.shapes, model.structure.load);
-  for (std::size_t i = 0; i < cycle.measured.displacements.size(); ++i)
-  {
-    fields.write(cycle.measured.displacements[i], cycle_data(i), "");
-    fields.layout.time.push_back(sample_time(cycle, i));
-  }
-  fields.on_file(
-      [&](Hdf5File& file)
-      {
-        file.keep();
-        write_whole_file(output / word(ResultFile::field_places), xdmf_text(fields.layout, report.run));
-      });
+    Hdf5File file(output / word(ResultFile::fields), report.run, field_sets);
+    Layout layout;
+    write_mesh(file, model.mesh, layout);
+    write_pairs(file, report.point.equilibrium, model.interface);
+    if (!scene.probes.empty()) file.write("probes/node", probed_nodes(scene.probes, model.mesh));
+    if (report.point.equilibrium.u.get()) write_contact(file, report.point.equilibrium, model, layout);
+    for (int number = 0; const ModeCauses& causes : report.sensitivity.modes)
+      file.write(format("modes/%d/pair_power", ++number), causes.pair_powers);
+    for (const auto& [data, name, values] : fields.all())
+    {
+      file.write(data, values, 3);
+      if (!name.empty()) layout.still.push_back({name, data, 3});
+    }
+    const LimitCycle& cycle = report.motion.cycle;
+    for (std::size_t i = 0; i < cycle.measured.displacements.size(); ++i) layout.time.push_back(sample_time(cycle, i));
+    file.keep();
+    write_whole_file(output / word(ResultFile::field_places), xdmf_text(layout, report.run));
+  };
+  on_rank_zero(comm, write);
 }
 
 } // namespace squeal

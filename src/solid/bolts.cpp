@@ -14,7 +14,7 @@ namespace squeal
 namespace
 {
 
-using Corners = std::array<int, 4>; // ascending; a triangle has -1 first
+using Corners = std::vector<int>; // ascending
 
 /// Elements at the nodes of a section, and the faces that they share there.
 struct Around
@@ -37,12 +37,10 @@ Around around(const Mesh& mesh, const std::vector<int>& section)
     if (!std::ranges::any_of(nodes_of(element), [&](int node) { return is_on(section, node); })) continue;
     if (is_shell(element.shape)) continue;
     result.elements.push_back(static_cast<int>(i));
-    for (const std::array<int, 4>& corners : corner_faces(element.shape))
+    for (Corners& face : faces_of(element))
     {
-      Corners face;
-      for (std::size_t k = 0; k < 4; ++k) face[k] = corners[k] < 0 ? -1 : element.nodes[corners[k]];
       std::ranges::sort(face);
-      if (std::ranges::any_of(face, [&](int node) { return node >= 0 && is_on(section, node); }))
+      if (std::ranges::any_of(face, [&](int node) { return is_on(section, node); }))
         result.faces[face].push_back(static_cast<int>(i));
     }
   }
@@ -76,7 +74,7 @@ std::vector<int> elements_above(const Mesh& mesh, const Bolt& bolt, const std::v
     if (elements.size() != 2) continue;
     int low = place_of(elements[0]), high = place_of(elements[1]);
     if (height(mesh, elements[0], bolt.axis) > height(mesh, elements[1], bolt.axis)) std::swap(low, high);
-    if (std::ranges::all_of(face, [&](int node) { return node < 0 || is_on(section, node); }))
+    if (std::ranges::all_of(face, [&](int node) { return is_on(section, node); }))
       across.push_back({low, high});
     else
       patches.join(low, high);

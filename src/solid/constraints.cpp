@@ -63,13 +63,6 @@ void add_row(Constraints& constraints, const ConstraintRow& row, const std::stri
     make_dependent(constraints, pivot, std::move(terms));
 }
 
-/// A node of a coupling with its weight.
-struct Weighted
-{
-  int node = 0;
-  double weight = 0;
-};
-
 std::vector<Weighted> weighted_nodes(const Coupling& coupling, const Mesh& mesh)
 {
   std::vector<Weighted> result;
@@ -77,44 +70,6 @@ std::vector<Weighted> weighted_nodes(const Coupling& coupling, const Mesh& mesh)
     for (const int node : named_nodes(mesh, coupling.on[i], "coupling " + coupling.name))
       result.push_back({node, coupling.weights.empty() ? 1 : coupling.weights[i]});
   return result;
-}
-
-void add_coupling(Constraints& constraints, const Mesh& mesh, const Coupling& coupling)
-{
-  constexpr double least_spread = 1e-9; // of the moments of the nodes, about any axis
-  const std::vector<Weighted> cloud = weighted_nodes(coupling, mesh);
-  double whole = 0;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  for (const auto& [node, weight] : cloud)
-  {
-    whole += weight;
-    centre += weight * as_eigen(mesh.nodes[node]);
-  }
-  centre /= whole;
-  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
-  for (const auto& [node, weight] : cloud)
-  {
-    const Eigen::Matrix3d r = cross_matrix(as_eigen(mesh.nodes[node]) - centre);
-    moments -= weight * r * r;
-  }
-  const Eigen::Vector3d spread = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moments).eigenvalues();
-  if (!(spread(0) > least_spread * spread(2)))
-    throw Error("coupling " + coupling.name + ": its " + std::to_string(cloud.size()) +
-                " nodes are on a line or at one place, so they do not turn it about every axis: take nodes beside it");
-  const Eigen::Matrix3d inverse = moments.inverse(), arm = cross_matrix(as_eigen(coupling.at) - centre);
-  const int reference = mesh.points.at(coupling.name);
-  std::array<std::vector<ConstraintTerm>, 6> rows;
-  for (const auto& [node, weight] : cloud)
-  {
-    Eigen::Matrix<double, 6, 3> factors;
-    factors.bottomRows<3>() = weight * inverse * cross_matrix(as_eigen(mesh.nodes[node]) - centre);
-    factors.topRows<3>() = weight / whole * Eigen::Matrix3d::Identity() - arm * factors.bottomRows<3>();
-    for (int motion = 0; motion < 6; ++motion)
-      for (int c = 0; c < 3; ++c)
-        rows[static_cast<std::size_t>(motion)].push_back({6 * PetscInt{node} + c, factors(motion, c)});
-  }
-  for (int motion = 0; motion < 6; ++motion)
-    make_dependent(constraints, 6 * PetscInt{reference} + motion, std::move(rows[static_cast<std::size_t>(motion)]));
 }
 
 /// The motions of a node that a support holds in its frame.
@@ -170,6 +125,42 @@ void make_dependent(Constraints& constraints, PetscInt nodal_dof, std::vector<Co
   constraints.dependent[nodal_dof] = std::move(terms);
 }
 
+std::array<std::vector<ConstraintTerm>, 6> rows_of_cloud(const Mesh& mesh, const std::vector<Weighted>& cloud,
+                                                         const Vec3& at, const std::string& user)
+{
+  constexpr double least_spread = 1e-9; // of the moments of the nodes, about any axis
+  double whole = 0;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const auto& [node, weight] : cloud)
+  {
+    whole += weight;
+    centre += weight * as_eigen(mesh.nodes[node]);
+  }
+  centre /= whole;
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  for (const auto& [node, weight] : cloud)
+  {
+    const Eigen::Matrix3d r = cross_matrix(as_eigen(mesh.nodes[node]) - centre);
+    moments -= weight * r * r;
+  }
+  const Eigen::Vector3d spread = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moments).eigenvalues();
+  if (!(spread(0) > least_spread * spread(2)))
+    throw Error(user + ": its " + std::to_string(cloud.size()) +
+                " nodes are on a line or at one place, so they do not turn it about every axis: take nodes beside it");
+  const Eigen::Matrix3d inverse = moments.inverse(), arm = cross_matrix(as_eigen(at) - centre);
+  std::array<std::vector<ConstraintTerm>, 6> rows;
+  for (const auto& [node, weight] : cloud)
+  {
+    Eigen::Matrix<double, 6, 3> factors;
+    factors.bottomRows<3>() = weight * inverse * cross_matrix(as_eigen(mesh.nodes[node]) - centre);
+    factors.topRows<3>() = weight / whole * Eigen::Matrix3d::Identity() - arm * factors.bottomRows<3>();
+    for (int motion = 0; motion < 6; ++motion)
+      for (int c = 0; c < 3; ++c)
+        rows[static_cast<std::size_t>(motion)].push_back({6 * PetscInt{node} + c, factors(motion, c)});
+  }
+  return rows;
+}
+
 RelativeMotion relative_motion(const Connector& connector, const Mesh& mesh)
 {
   RelativeMotion result;
@@ -204,7 +195,13 @@ void hold(Constraints& constraints, const Mesh& mesh, const Support& support)
 
 void add_couplings(Constraints& constraints, const Mesh& mesh, const std::vector<Coupling>& couplings)
 {
-  for (const Coupling& coupling : couplings) add_coupling(constraints, mesh, coupling);
+  for (const Coupling& coupling : couplings)
+  {
+    auto rows = rows_of_cloud(mesh, weighted_nodes(coupling, mesh), coupling.at, "coupling " + coupling.name);
+    for (std::size_t motion = 0; motion < 6; ++motion)
+      make_dependent(constraints, 6 * PetscInt{mesh.points.at(coupling.name)} + static_cast<PetscInt>(motion),
+                     std::move(rows[motion]));
+  }
 }
 
 void add_rows(Constraints& constraints, const Mesh& mesh, const Scene& scene)

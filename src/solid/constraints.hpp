@@ -57,9 +57,20 @@ RelativeMotion relative_motion(const Connector& connector, const Mesh& mesh);
 /// A connector in messages.
 std::string label_of(const Connector& connector);
 
-/// The motions of couplings by those of their nodes:
+/// A node of a cloud with its weight.
+struct Weighted
+{
+  int node = 0;
+  double weight = 1;
+};
+
+/// Rows of the six motions of a place that follows a cloud of nodes:
 ///     theta = I^-1 sum w_i r_i x u_i,   u = sum w_i u_i/sum w_i + theta x (at - c),
 /// with r_i from the weighted centroid c and I = sum w_i (|r_i|^2 1 - r_i r_i'). Throws Error for nodes on a line.
+std::array<std::vector<ConstraintTerm>, 6> rows_of_cloud(const Mesh& mesh, const std::vector<Weighted>& cloud,
+                                                         const Vec3& at, const std::string& user);
+
+/// The motions of couplings by those of their nodes.
 void add_couplings(Constraints& constraints, const Mesh& mesh, const std::vector<Coupling>& couplings);
 
 /// The motions that a support holds or moves. Each is a row, solved for the free motion of its largest factor: of a

@@ -161,7 +161,7 @@ Contribution element_contribution(const NumberedMesh& numbered, const Scene& sce
 {
   const Element& element = numbered.mesh.elements[index];
   const Part& part = scene.parts[element.part];
-  const std::vector<Vec3> x = positions_of(numbered.mesh, element);
+  const std::vector<Vec3> x = positions_of(numbered.mesh, nodes_of(element));
   try
   {
     return damped(nodal_dofs_of(element), element_matrices(element.shape, x, material_at(part, x), part.thickness),
@@ -215,6 +215,18 @@ std::vector<PetscInt> nodal_dofs_of(std::span<const int> nodes, int components)
   for (const int node : nodes)
     for (int c = 0; c < components; ++c) result.push_back(6 * PetscInt{node} + c);
   return result;
+}
+
+void for_each_contribution(const NumberedMesh& numbered, const Scene& scene, MPI_Comm comm,
+                           const std::function<void(const Contribution&)>& visit)
+{
+  const auto visit_own = [&]
+  {
+    for (std::size_t i = 0; i < numbered.mesh.elements.size(); ++i)
+      if (numbered.partition.element_rank[i] == rank_of(comm)) visit(element_contribution(numbered, scene, i));
+    if (rank_of(comm) == 0) std::ranges::for_each(lumped_contributions(numbered.mesh, scene), visit);
+  };
+  on_every_rank(comm, visit_own);
 }
 
 std::vector<PetscInt> nodal_dofs_of(const Element& element)

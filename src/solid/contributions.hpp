@@ -5,6 +5,7 @@
 #include "squeal/solid/structure.hpp"
 
 #include <Eigen/Core>
+#include <functional>
 
 namespace squeal
 {
@@ -27,6 +28,11 @@ Contribution element_contribution(const NumberedMesh& numbered, const Scene& sce
 /// Contributions of points, bodies, couplings, added masses, springs, connectors, superelements and beams. The mesh
 /// must be whole.
 std::vector<Contribution> lumped_contributions(const Mesh& mesh, const Scene& scene);
+
+/// Calls visit for every contribution that this rank adds: of its elements; of what is lumped on rank 0. Collective:
+/// what one throws all throw.
+void for_each_contribution(const NumberedMesh& numbered, const Scene& scene, MPI_Comm comm,
+                           const std::function<void(const Contribution&)>& visit);
 
 /// Contributions of the elements of a beam, from end to end.
 std::vector<Contribution> beam_contributions(const Mesh& mesh, const Scene& scene, std::size_t index);

@@ -17,7 +17,6 @@
 #include "squeal/solid/element.hpp"
 
 #include <algorithm>
-#include <Eigen/Dense>
 #include <numeric>
 
 namespace squeal
@@ -179,28 +178,14 @@ std::map<int, std::vector<int>> solid_nodes_around_joints(Constraints& constrain
 
 void join_shells_to_solids(Constraints& constraints, const Mesh& mesh)
 {
-  const auto position = [&](int node) { return Eigen::Vector3d(mesh.nodes[node].data()); };
   for (const auto& [node, around] : solid_nodes_around_joints(constraints, mesh))
   {
-    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    for (const int k : around) mean += position(k) / static_cast<double>(around.size());
-    Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
-    for (const int k : around)
-    {
-      const Eigen::Vector3d r = position(k) - mean;
-      inertia += r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose();
-    }
-    const Eigen::Matrix3d inverse = inertia.inverse();
-    for (int axis = 0; axis < 3; ++axis)
-    {
-      if (constraints.kind_of(node, 3 + axis) != DofKind::free) continue;
-      std::vector<ConstraintTerm> terms;
-      for (const int k : around)
-        for (int c = 0; c < 3; ++c)
-          terms.push_back(
-              {6 * PetscInt{k} + c, inverse.row(axis).dot((position(k) - mean).cross(Eigen::Vector3d::Unit(c)))});
-      make_dependent(constraints, 6 * PetscInt{node} + 3 + axis, std::move(terms));
-    }
+    std::vector<Weighted> cloud;
+    for (const int k : around) cloud.push_back({k});
+    auto rows = rows_of_cloud(mesh, cloud, mesh.nodes[node], node_text(node, mesh.nodes[node]));
+    for (int motion = 3; motion < 6; ++motion)
+      if (constraints.kind_of(node, motion) == DofKind::free)
+        make_dependent(constraints, 6 * PetscInt{node} + motion, std::move(rows[static_cast<std::size_t>(motion)]));
   }
 }
 
@@ -236,25 +221,14 @@ void set_terms(const Constraints& constraints, const std::vector<PetscInt>& numb
   dofs.offsets.reserve(nodal_dofs + 1);
   for (PetscInt i = 0; i < nodal_dofs; ++i)
   {
-    if (constraints.kind[i] == DofKind::free)
-      dofs.terms.push_back({number[i], 1});
-    else if (constraints.kind[i] == DofKind::dependent)
-    {
-      FreeSum sum;
-      add_expanded(constraints, i, 1, sum);
-      std::map<PetscInt, double> row; // in the order of the free ones
-      for (const auto& [nodal_dof, factor] : sum.factors) row[number[nodal_dof]] = factor;
-      for (const auto& [dof, factor] : row)
-        if (factor != 0) dofs.terms.push_back({dof, factor});
-    }
-    dofs.offsets.push_back(dofs.terms.size());
-  }
-  if (constraints.shift.empty()) return;
-  for (PetscInt i = 0; i < nodal_dofs; ++i)
-  {
     FreeSum sum;
     add_expanded(constraints, i, 1, sum);
-    dofs.shift.push_back(sum.constant);
+    std::map<PetscInt, double> row; // in the order of the free ones
+    for (const auto& [nodal_dof, factor] : sum.factors) row[number[nodal_dof]] = factor;
+    for (const auto& [dof, factor] : row)
+      if (factor != 0) dofs.terms.push_back({dof, factor});
+    dofs.offsets.push_back(dofs.terms.size());
+    if (!constraints.shift.empty()) dofs.shift.push_back(sum.constant);
   }
 }
 

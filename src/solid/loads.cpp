@@ -26,9 +26,7 @@ void add_force(Vec load, const DofMap& dofs, PetscInt first, const Vec3& force)
 
 void add_pressure(Vec load, const DofMap& dofs, const Mesh& mesh, const Face& face, double pressure)
 {
-  std::vector<Vec3> x;
-  for (const int node : nodes_of(face)) x.push_back(mesh.nodes[node]);
-  const auto weights = face_weights(face.shape, x);
+  const auto weights = face_weights(face.shape, positions_of(mesh, nodes_of(face)));
   for (std::size_t i = 0; i < weights.size(); ++i)
     add_force(load, dofs, 6 * PetscInt{face.nodes[i]}, -pressure * weights[i]);
 }
@@ -58,31 +56,6 @@ std::set<int> coordinate_nodes(const Mesh& mesh)
   return nodes;
 }
 
-/// Adds T' M a of everything that has mass: elements on their ranks, the rest on rank 0. Collective.
-void add_gravity(Vec load, const NumberedMesh& numbered, const Scene& scene, const std::vector<Contribution>& lumped)
-{
-  const MPI_Comm comm = comm_of(load);
-  const std::set<int> coordinates = coordinate_nodes(numbered.mesh);
-  const auto add = [&](const Contribution& contribution)
-  {
-    Eigen::VectorXd a = Eigen::VectorXd::Zero(contribution.M.rows());
-    for (Eigen::Index k = 0; k < a.size(); ++k)
-    {
-      const PetscInt nodal_dof = contribution.nodal_dofs[static_cast<std::size_t>(k)];
-      const bool falls = nodal_dof % 6 < 3 && !coordinates.contains(static_cast<int>(nodal_dof / 6));
-      if (falls) a(k) = scene.gravity[static_cast<std::size_t>(nodal_dof % 6)];
-    }
-    add_vector(load, local_dofs(numbered.dofs, contribution.nodal_dofs), contribution.M * a);
-  };
-  const auto add_own = [&]
-  {
-    for (std::size_t i = 0; i < numbered.mesh.elements.size(); ++i)
-      if (numbered.partition.element_rank[i] == rank_of(comm)) add(element_contribution(numbered, scene, i));
-    for (const Contribution& contribution : lumped) add(contribution);
-  };
-  on_every_rank(comm, add_own);
-}
-
 Eigen::VectorXd shift_of(const DofMap& dofs, const std::vector<PetscInt>& nodal_dofs)
 {
   Eigen::VectorXd shift(static_cast<Eigen::Index>(nodal_dofs.size()));
@@ -90,23 +63,33 @@ Eigen::VectorXd shift_of(const DofMap& dofs, const std::vector<PetscInt>& nodal_
   return shift;
 }
 
-/// Adds -T' K s of what supports move. On rank 0.
-void add_prescribed(Vec load, const NumberedMesh& numbered, const Scene& scene, const std::vector<Contribution>& lumped)
+/// Throws Error for a part that spins and that a support moves.
+void check_moved(const NumberedMesh& numbered, const Scene& scene)
 {
-  const DofMap& dofs = numbered.dofs;
-  if (dofs.shift.empty()) return;
-  const auto add = [&](const Contribution& of)
-  { add_vector(load, local_dofs(dofs, of.nodal_dofs), -of.K * shift_of(dofs, of.nodal_dofs)); };
-  for (std::size_t i = 0; i < numbered.mesh.elements.size(); ++i)
-  {
-    const Element& element = numbered.mesh.elements[i];
-    if (shift_of(dofs, nodal_dofs_of(element)).isZero(0)) continue;
-    const Part& part = scene.parts[static_cast<std::size_t>(element.part)];
-    if (part.rotation)
+  for (const Element& element : numbered.mesh.elements)
+    if (const Part& part = scene.parts[static_cast<std::size_t>(element.part)];
+        part.rotation && !shift_of(numbered.dofs, nodal_dofs_of(element)).isZero(0))
       throw Error("part " + part.name + " spins, so no support can move its nodes: let the support hold them");
-    add(element_contribution(numbered, scene, i));
-  }
-  for (const Contribution& contribution : lumped) add(contribution);
+}
+
+/// Adds T' (M a - K s): gravity on everything that has mass, and what supports move. Collective.
+void add_gravity_and_shift(Vec load, const NumberedMesh& numbered, const Scene& scene, MPI_Comm comm)
+{
+  const std::set<int> coordinates = coordinate_nodes(numbered.mesh);
+  const DofMap& dofs = numbered.dofs;
+  if (!dofs.shift.empty()) on_rank_zero(comm, [&] { check_moved(numbered, scene); });
+  const auto add = [&](const Contribution& of)
+  {
+    Eigen::VectorXd a = Eigen::VectorXd::Zero(of.M.rows());
+    for (Eigen::Index k = 0; k < a.size(); ++k)
+    {
+      const PetscInt nodal_dof = of.nodal_dofs[static_cast<std::size_t>(k)];
+      const bool falls = nodal_dof % 6 < 3 && !coordinates.contains(static_cast<int>(nodal_dof / 6));
+      if (falls) a(k) = scene.gravity[static_cast<std::size_t>(nodal_dof % 6)];
+    }
+    add_vector(load, local_dofs(dofs, of.nodal_dofs), of.M * a - of.K * shift_of(dofs, of.nodal_dofs));
+  };
+  if (scene.gravity != Vec3{} || !dofs.shift.empty()) for_each_contribution(numbered, scene, comm, add);
 }
 
 /// The section of a bolt. Collective.
@@ -168,10 +151,7 @@ void assemble_preload(Structure& structure, const NumberedMesh& numbered, const 
   structure.bolts.clear();
   if (!has_preload(scene)) return;
   structure.preload = zeros_like(structure.load);
-  std::vector<Contribution> lumped; // on rank 0, which adds them
-  on_rank_zero(comm, [&] { lumped = lumped_contributions(numbered.mesh, scene); });
-  if (scene.gravity != Vec3{}) add_gravity(structure.preload, numbered, scene, lumped);
-  on_rank_zero(comm, [&] { add_prescribed(structure.preload, numbered, scene, lumped); });
+  add_gravity_and_shift(structure.preload, numbered, scene, comm);
   finish(structure.preload);
   check(VecAXPY(structure.load, 1, structure.preload));
   for (const Bolt& bolt : scene.bolts) structure.bolts.push_back(bolt_of(bolt, numbered, scene, structure.load));

@@ -64,12 +64,6 @@ std::string nonzero_part(Mat A, double sign, const std::filesystem::path& file, 
          format("%g, the largest entry is %g", 2 * worst.magnitude, scale);
 }
 
-/// Throws Error if A is not symmetric.
-void check_symmetric(Mat A, const std::filesystem::path& file, MPI_Comm comm)
-{
-  agree(comm, nonzero_part(A, -1, file, comm));
-}
-
 /// Whether rank 0 has the file.
 bool is_there(const std::filesystem::path& file, MPI_Comm comm)
 {
@@ -103,14 +97,6 @@ Owned<Mat> load_any_square(const std::filesystem::path& file, PetscInt& size, MP
   return load_matrix(file, found, {PETSC_DECIDE, PETSC_DECIDE}, comm);
 }
 
-/// Loads a symmetric matrix.
-Owned<Mat> load_square(const std::filesystem::path& file, PetscInt& size, MPI_Comm comm)
-{
-  auto A = load_any_square(file, size, comm);
-  check_symmetric(A, file, comm);
-  return A;
-}
-
 /// Returns a matrix of zeros with the pattern of another.
 Owned<Mat> zero_of(Mat pattern)
 {
@@ -119,15 +105,17 @@ Owned<Mat> zero_of(Mat pattern)
   return zero;
 }
 
-/// Loads the symmetric part of a matrix; the skew part, if there is one, goes to `skew`.
-Owned<Mat> load_parts(const std::filesystem::path& file, PetscInt& size, Owned<Mat>& skew, MPI_Comm comm)
+/// Loads the symmetric part of a matrix; the skew part, if there is one, goes to `skew`. Throws Error where it may have
+/// none, which null says.
+Owned<Mat> load_symmetric(const std::filesystem::path& file, PetscInt& size, Owned<Mat>* skew, MPI_Comm comm)
 {
   auto A = load_any_square(file, size, comm);
   const std::string unsymmetric = nonzero_part(A, -1, file, comm);
+  if (!skew) agree(comm, unsymmetric);
   int found = unsymmetric.empty() ? 0 : 1;
   MPI_Allreduce(MPI_IN_PLACE, &found, 1, MPI_INT, MPI_MAX, comm);
   if (found == 0) return A;
-  skew = part_of(A, -1);
+  *skew = part_of(A, -1);
   return part_of(A, 1);
 }
 
@@ -200,18 +188,12 @@ Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm)
 {
   Structure structure;
   PetscInt size = -1;
-  structure.M = load_square(folder / "M.petsc", size, comm);
-  const bool has_C = is_there(folder / "C.petsc", comm);
-  if (is_there(folder / "B.petsc", comm))
-  {
-    structure.K = load_square(folder / "K.petsc", size, comm);
-    structure.C = has_C ? load_square(folder / "C.petsc", size, comm) : zero_of(structure.M);
-  }
-  else
-  {
-    structure.K = load_parts(folder / "K.petsc", size, structure.H, comm);
-    structure.C = has_C ? load_parts(folder / "C.petsc", size, structure.G, comm) : zero_of(structure.M);
-  }
+  structure.M = load_symmetric(folder / "M.petsc", size, nullptr, comm);
+  const bool has_pairs = is_there(folder / "B.petsc", comm);
+  structure.K = load_symmetric(folder / "K.petsc", size, has_pairs ? nullptr : &structure.H, comm);
+  structure.C = is_there(folder / "C.petsc", comm)
+                    ? load_symmetric(folder / "C.petsc", size, has_pairs ? nullptr : &structure.G, comm)
+                    : zero_of(structure.M);
   add_skew(folder / "G.petsc", size, structure.G, comm);
   add_skew(folder / "H.petsc", size, structure.H, comm);
   share_pattern(structure);

@@ -153,8 +153,8 @@ template <int n> Eigen::Vector2d edge_function(Eigen::Index k, const NodeValues&
 template <int n>
 void add_plate(ShellStrains<n>& B, const PlanePositions<n>& X, const Eigen::Vector3d& xi, double slenderness)
 {
-  const ShapeFunctions at = shape_functions(n == 3 ? FaceShape::triangle3 : FaceShape::quad4, xi);
-  const ShapeFunctions quadratic = shape_functions(n == 3 ? FaceShape::triangle6 : FaceShape::quad8, xi);
+  const ShapeFunctions at = shape_functions(n == 3 ? Shape::triangle3 : Shape::quad4, xi);
+  const ShapeFunctions quadratic = shape_functions(n == 3 ? Shape::triangle6 : Shape::quad8, xi);
   const Eigen::Matrix2d inverse = (at.dN.topRows<2>() * X.transpose()).inverse();
   const Gradients<n> g = inverse * at.dN.topRows<2>();
   const Gradients<n> P = inverse * quadratic.dN.topRows<2>().rightCols(n);
@@ -233,7 +233,7 @@ Matrix9 elasticity(const Material& material, double h)
   return D;
 }
 
-template <int n> constexpr Shape shell_shape = n == 3 ? Shape::shell3 : Shape::shell4;
+template <int n> constexpr Shape shell_shape = n == 3 ? Shape::triangle3 : Shape::quad4;
 
 template <int n> Eigen::Matrix2d jacobian(const ShapeFunctions& at, const PlanePositions<n>& X)
 {
@@ -274,7 +274,7 @@ template <int n>
 Eigen::Matrix<double, 3, 6 * n> plane_displacements(const PlanePositions<n>& X, const Eigen::Vector3d& xi)
 {
   const NodeValues N = shape_functions(shell_shape<n>, xi).N;
-  const NodeValues bubble = shape_functions(n == 3 ? FaceShape::triangle6 : FaceShape::quad8, xi).N.tail(n) / 8;
+  const NodeValues bubble = shape_functions(n == 3 ? Shape::triangle6 : Shape::quad8, xi).N.tail(n) / 8;
   Eigen::Matrix<double, 3, 6 * n> U = Eigen::Matrix<double, 3, 6 * n>::Zero();
   for (Eigen::Index i = 0; i < n; ++i)
   {
@@ -322,7 +322,7 @@ template <int n> ElementMatrices matrices(const NodePositions& X, const Material
 
 ElementMatrices shell_matrices(Shape shape, const NodePositions& X, const Material& material, double thickness)
 {
-  return shape == Shape::shell3 ? matrices<3>(X, material, thickness) : matrices<4>(X, material, thickness);
+  return shape == Shape::triangle3 ? matrices<3>(X, material, thickness) : matrices<4>(X, material, thickness);
 }
 
 } // namespace squeal

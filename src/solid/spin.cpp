@@ -23,32 +23,23 @@ bool spins(const Part& part)
   return part.rotation && part.rotation->rate != 0;
 }
 
-/// A face of the elements of a part, counter-clockwise seen from outside.
-struct OuterFace
+/// The outer faces of a part: corner nodes, counter-clockwise seen from outside.
+std::vector<std::vector<int>> outer_faces(const Mesh& mesh, int part)
 {
-  std::array<int, 4> corners{}; // nodes; a triangle has -1 as its fourth
-  int count = 0;                // of elements of the part that have it
-};
-
-/// Keyed by the ascending corners.
-using OuterFaces = std::map<std::array<int, 4>, OuterFace>;
-
-OuterFaces faces_of(const Mesh& mesh, int part)
-{
-  OuterFaces faces;
+  std::map<std::vector<int>, std::vector<int>> faces; // by ascending corners; two elements share the others
   for (const Element& element : mesh.elements)
   {
     if (element.part != part) continue;
-    for (const std::array<int, 4>& corners : corner_faces(element.shape))
+    for (std::vector<int>& face : faces_of(element))
     {
-      OuterFace face;
-      for (std::size_t i = 0; i < 4; ++i) face.corners[i] = corners[i] < 0 ? -1 : element.nodes[corners[i]];
-      std::array<int, 4> key = face.corners;
-      std::sort(key.begin(), key.end());
-      ++faces.try_emplace(key, face).first->second.count;
+      std::vector<int> key = face;
+      std::ranges::sort(key);
+      if (const auto [known, is_new] = faces.try_emplace(std::move(key), std::move(face)); !is_new) faces.erase(known);
     }
   }
-  return faces;
+  std::vector<std::vector<int>> outer;
+  for (auto& [key, face] : faces) outer.push_back(std::move(face));
+  return outer;
 }
 
 /// How far a face is turned from its circle about the axis.
@@ -61,11 +52,9 @@ struct Turned
   double area = 0;   // [m2]
 };
 
-Turned turned_from_circle(const Mesh& mesh, const OuterFace& face, const Rotation& rotation)
+Turned turned_from_circle(std::span<const Vec3> x, const Rotation& rotation)
 {
-  std::vector<Vec3> x, radius;
-  for (const int node : face.corners)
-    if (node >= 0) x.push_back(mesh.nodes[static_cast<std::size_t>(node)]);
+  std::vector<Vec3> radius;
   Turned turned;
   for (const Vec3& corner : x)
   {
@@ -99,10 +88,9 @@ void check_revolution(const Mesh& mesh, const Part& part, int index)
   };
   Vec3 middle{};
   double area = 0, radius = 0;
-  for (const auto& [key, face] : faces_of(mesh, index))
+  for (const std::vector<int>& face : outer_faces(mesh, index))
   {
-    if (face.count > 1) continue;
-    const Turned turned = turned_from_circle(mesh, face, *part.rotation);
+    const Turned turned = turned_from_circle(positions_of(mesh, face), *part.rotation);
     if (turned.angle > turned.within / 2 + rounding)
       throw refusal(format("the face at (%g, %g, %g) is turned by %.1f degrees from its circle and spans %.1f",
                            turned.at[0], turned.at[1], turned.at[2], turned.angle * degrees, turned.within * degrees));
@@ -134,7 +122,8 @@ std::vector<Spinning> spinning_elements(const NumberedMesh& numbered, const Scen
     const Element& element = mesh.elements[i];
     const Part& part = scene.parts[static_cast<std::size_t>(element.part)];
     if (!spins(part) || numbered.partition.element_rank[i] != rank) continue;
-    result.push_back({element, part, positions_of(mesh, element), local_dofs(numbered.dofs, nodal_dofs_of(element))});
+    result.push_back(
+        {element, part, positions_of(mesh, nodes_of(element)), local_dofs(numbered.dofs, nodal_dofs_of(element))});
   }
   return result;
 }

@@ -22,14 +22,8 @@ void add_contribution(const Structure& structure, const DofMap& dofs, const Cont
   if (structure.K_loss.get()) add_matrix(structure.K_loss, local, contribution.loss_factor * contribution.K);
 }
 
-/// Whether this rank adds the contribution of an element; rank 0 adds those of what is lumped.
-bool is_own(const NumberedMesh& numbered, std::size_t element, MPI_Comm comm)
-{
-  return numbered.partition.element_rank[element] == rank_of(comm);
-}
-
 /// A matrix of zeros with the pattern of all contributions, as PETSc counts it.
-Owned<Mat> zero_matrix(const NumberedMesh& numbered, const std::vector<Contribution>& lumped, MPI_Comm comm)
+Owned<Mat> zero_matrix(const NumberedMesh& numbered, const Scene& scene, MPI_Comm comm)
 {
   const DofMap& dofs = numbered.dofs;
   const PetscInt rows = dofs.last - dofs.first;
@@ -48,9 +42,12 @@ Owned<Mat> zero_matrix(const NumberedMesh& numbered, const std::vector<Contribut
     check(MatSetValues(pattern, count, free.data(), count, free.data(), nullptr, INSERT_VALUES));
   };
   for (std::size_t i = 0; i < numbered.mesh.elements.size(); ++i)
-    if (is_own(numbered, i, comm)) add(nodal_dofs_of(numbered.mesh.elements[i]));
-  for (const Contribution& contribution : lumped)
-    if (rank_of(comm) == 0) add(contribution.nodal_dofs);
+    if (numbered.partition.element_rank[i] == rank_of(comm)) add(nodal_dofs_of(numbered.mesh.elements[i]));
+  const auto add_lumped = [&]
+  {
+    for (const Contribution& lumped : lumped_contributions(numbered.mesh, scene)) add(lumped.nodal_dofs);
+  };
+  on_rank_zero(comm, add_lumped);
   finish(pattern);
   check(MatPreallocatorPreallocate(pattern, PETSC_TRUE, A));
   return A;
@@ -65,20 +62,12 @@ Structure assemble(const NumberedMesh& numbered, const Scene& scene, MPI_Comm co
   Structure structure;
   structure.elements = static_cast<std::int64_t>(mesh.elements.size());
   structure.names = dofs.names;
-  std::vector<Contribution> lumped;
-  on_every_rank(comm, [&] { lumped = lumped_contributions(mesh, scene); });
-  structure.M = zero_matrix(numbered, lumped, comm);
+  structure.M = zero_matrix(numbered, scene, comm);
   structure.loss_omega = loss_omega(scene);
   for (Owned<Mat>* A : {&structure.C, &structure.K}) *A = copy_of(structure.M);
   if (structure.loss_omega > 0) structure.K_loss = copy_of(structure.M);
-  const auto add_own_elements = [&]
-  {
-    for (std::size_t i = 0; i < mesh.elements.size(); ++i)
-      if (is_own(numbered, i, comm)) add_contribution(structure, dofs, element_contribution(numbered, scene, i));
-  };
-  on_every_rank(comm, add_own_elements);
-  for (const Contribution& contribution : lumped)
-    if (rank_of(comm) == 0) add_contribution(structure, dofs, contribution);
+  for_each_contribution(numbered, scene, comm,
+                        [&](const Contribution& contribution) { add_contribution(structure, dofs, contribution); });
   for (Mat A : {structure.M.get(), structure.C.get(), structure.K.get(), structure.K_loss.get()})
   {
     if (!A) continue;

@@ -56,7 +56,7 @@ inline void add_box(Mesh& mesh, const std::string& name, int part, const Vec3& l
         for (std::size_t s = 0; s < 6; ++s)
         {
           if (cell[s / 2] != (s % 2 == 0 ? 0 : cells[s / 2] - 1)) continue;
-          Face face{FaceShape::quad4, {}};
+          Face face{Shape::quad4, {}};
           for (std::size_t v = 0; v < 4; ++v) face.nodes[v] = element.nodes[static_cast<std::size_t>(side[s][v])];
           mesh.surfaces[name + side_names[s]].push_back(face);
           add_to_group(mesh, name + side_names[s], std::span(face.nodes).first(4));
@@ -82,7 +82,7 @@ inline void add_strip(Mesh& mesh, const std::string& name, int part, const Strip
   for (int i = 0; i < strip.along; ++i)
     for (int j = 0; j < strip.across; ++j)
     {
-      Element element{Shape::shell4, part, {}};
+      Element element{Shape::quad4, part, {}};
       element.nodes = {at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)};
       mesh.elements.push_back(element);
       add_to_group(mesh, name, std::span(element.nodes).first(4));

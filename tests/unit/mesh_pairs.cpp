@@ -109,8 +109,8 @@ TEST_CASE("shells of either numbering face what they touch, patch by patch")
         const auto at = [&](double dx, double dy) { return node_at(mesh, {a + dx, b + dy, 1.25}); };
         std::array<int, 4> corners{at(0, 0), at(0.5, 0), at(0.5, 0.5), at(0, 0.5)};
         if ((i + j + (x > 0)) % 2 == 1) std::reverse(corners.begin(), corners.end());
-        Face face{FaceShape::quad4, {}, true};
-        Element shell{Shape::shell4, 1, {}};
+        Face face{Shape::quad4, {}, true};
+        Element shell{Shape::quad4, 1, {}};
         std::copy(corners.begin(), corners.end(), face.nodes.begin());
         std::copy(corners.begin(), corners.end(), shell.nodes.begin());
         mesh.elements.push_back(shell);

@@ -33,8 +33,8 @@ const std::vector<Reference> references = {{Shape::hex8, 5, brick},
                                            {Shape::wedge6, 6, prism},
                                            {Shape::tet10, 11, simplex},
                                            {Shape::tet4, 4, simplex},
-                                           {Shape::shell4, 3, {{0, 0, 0}, {1, 0, 0}, {1.1, 1, 0}, {0, 0.9, 0}}},
-                                           {Shape::shell3, 2, {{0, 0, 0}, {1, 0, 0}, {0.2, 1, 0}}}};
+                                           {Shape::quad4, 3, {{0, 0, 0}, {1, 0, 0}, {1.1, 1, 0}, {0, 0.9, 0}}},
+                                           {Shape::triangle3, 2, {{0, 0, 0}, {1, 0, 0}, {0.2, 1, 0}}}};
 
 // One element whose mid-sides are off the middle.
 FileMesh single(const Reference& reference)
@@ -69,7 +69,7 @@ std::array<double, 2> moments(const Mesh& mesh)
   std::array<double, 2> sum{};
   for (const Element& element : mesh.elements)
   {
-    const NodePositions X = position_matrix(positions_of(mesh, element));
+    const NodePositions X = position_matrix(positions_of(mesh, nodes_of(element)));
     for (const auto& [xi, weight, at] : mass_rule(element.shape))
     {
       Eigen::Matrix3d J = X * at.dN.transpose();

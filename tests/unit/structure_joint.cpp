@@ -60,7 +60,7 @@ Mesh beam_and_skin(double height, double skin)
   add_strip(top, "strip", 1, {{1, 0, height + skin / 2}, {-1, 0, 0}, {0, width, 0}, 30, 3});
   for (const Element& shell : top.elements)
   {
-    Face face{FaceShape::quad4, {}, true};
+    Face face{Shape::quad4, {}, true};
     std::copy_n(shell.nodes.begin(), 4, face.nodes.begin());
     top.surfaces["strip"].push_back(face);
   }

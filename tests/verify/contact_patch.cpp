@@ -16,11 +16,11 @@ const MPI_Comm& world = PETSC_COMM_WORLD; // set when the session starts
 /// Shapes of solids by the faces that touch: 3, 4, 6 and 8 nodes.
 constexpr std::array shapes = {Shape::tet4, Shape::hex8, Shape::tet10, Shape::hex20};
 
-FaceShape face_of(int nodes)
+Shape face_of(int nodes)
 {
-  for (const FaceShape shape : {FaceShape::triangle3, FaceShape::quad4, FaceShape::triangle6})
+  for (const Shape shape : {Shape::triangle3, Shape::quad4, Shape::triangle6})
     if (node_count(shape) == nodes) return shape;
-  return FaceShape::quad8;
+  return Shape::quad8;
 }
 
 /// The node of the mesh from `first` on that is nearest to the middle of two nodes.

@@ -154,11 +154,11 @@ TEST_CASE("the weights of a closed surface of faces are its area vector, and a s
 {
   const std::vector<Vec3> corners = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0},
                                      {1, 0, 0}, {2, 1, 0}, {1, 2, 0}, {0, 1, 0}};
-  const auto weights = [&](FaceShape shape, std::size_t n) { return face_weights(shape, std::span(corners).first(n)); };
-  for (const auto& w : weights(FaceShape::quad4, 4)) CHECK(w[2] == approx(1, 1e-14));
-  CHECK(weights(FaceShape::quad8, 8)[0][2] == approx(-1. / 3, 1e-13)); // why quad8 cannot touch
+  const auto weights = [&](Shape shape, std::size_t n) { return face_weights(shape, std::span(corners).first(n)); };
+  for (const auto& w : weights(Shape::quad4, 4)) CHECK(w[2] == approx(1, 1e-14));
+  CHECK(weights(Shape::quad8, 8)[0][2] == approx(-1. / 3, 1e-13)); // why quad8 cannot touch
   const std::vector<Vec3> triangle = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.5, 0, 0}, {0.5, 0.5, 0}, {0, 0.5, 0}};
-  const auto w = face_weights(FaceShape::triangle6, triangle);
+  const auto w = face_weights(Shape::triangle6, triangle);
   CHECK(std::abs(w[0][2]) < 1e-15);
   CHECK(w[4][2] == approx(1. / 6, 1e-13));
 }
@@ -169,11 +169,11 @@ namespace
 /// Consistent forces of a traction [Pa] on the plane end x = length; the traction is interpolated from the nodes' own.
 Eigen::VectorXd end_load(const small_fem::Mesh& mesh, double length, const std::function<Vec3(const Vec3&)>& traction)
 {
-  static const std::map<Shape, std::pair<FaceShape, std::vector<int>>> ends = {
-      {Shape::hex8, {FaceShape::quad4, {1, 2, 6, 5}}},
-      {Shape::wedge6, {FaceShape::quad4, {1, 2, 5, 4}}},
-      {Shape::hex20, {FaceShape::quad8, {1, 2, 6, 5, 11, 14, 18, 12}}},
-      {Shape::tet10, {FaceShape::triangle6, {1, 2, 3, 5, 8, 9}}}};
+  static const std::map<Shape, std::pair<Shape, std::vector<int>>> ends = {
+      {Shape::hex8, {Shape::quad4, {1, 2, 6, 5}}},
+      {Shape::wedge6, {Shape::quad4, {1, 2, 5, 4}}},
+      {Shape::hex20, {Shape::quad8, {1, 2, 6, 5, 11, 14, 18, 12}}},
+      {Shape::tet10, {Shape::triangle6, {1, 2, 3, 5, 8, 9}}}};
   const auto& [face, local] = ends.at(mesh.shape);
   Eigen::VectorXd load = Eigen::VectorXd::Zero(3 * Eigen::Index(mesh.x.size()));
   for (const auto& element : mesh.elements)

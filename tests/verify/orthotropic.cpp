@@ -143,7 +143,7 @@ TEST_CASE("a bar pulled at an angle to its axes has the off-axis modulus")
           for (std::size_t i = 0; i < (quadratic ? 8u : 4u); ++i)
             face.push_back(mesh.x[element[static_cast<std::size_t>(nodes[i])]]);
           if (std::abs(face[0][0] - at) > 1e-9 || std::abs(face[2][0] - at) > 1e-9) continue;
-          const auto weights = face_weights(quadratic ? FaceShape::quad8 : FaceShape::quad4, face);
+          const auto weights = face_weights(quadratic ? Shape::quad8 : Shape::quad4, face);
           const double out = at > 0 ? 1 : -1, sense = (weights[0][0] + weights[1][0] + weights[2][0] + weights[3][0] +
                                                        (quadratic ? 4 * weights[4][0] : 0)) > 0
                                                           ? 1

@@ -12,11 +12,11 @@ using namespace small_fem;
 namespace
 {
 
-const std::vector<std::pair<std::string, Shape>> shells = {{"shell4", Shape::shell4}, {"shell3", Shape::shell3}};
+const std::vector<std::pair<std::string, Shape>> shells = {{"shell4", Shape::quad4}, {"shell3", Shape::triangle3}};
 
 small_fem::Mesh in_shell(const small_fem::Mesh& quads, Shape shape)
 {
-  return shape == Shape::shell3 ? triangles(quads) : quads;
+  return shape == Shape::triangle3 ? triangles(quads) : quads;
 }
 
 Eigen::Matrix3d turn(double about_z, double about_x)
@@ -35,7 +35,7 @@ using Motion = Eigen::Matrix<double, 6, 1>; // translations and rotations of a n
 /// MacNeal and Harder's plate of 5 skew quadrilaterals, z = 0.
 small_fem::Mesh patch_of_quads()
 {
-  small_fem::Mesh mesh{Shape::shell4, {}, {}};
+  small_fem::Mesh mesh{Shape::quad4, {}, {}};
   mesh.x = {{0, 0, 0},       {0.24, 0, 0},    {0.24, 0.12, 0}, {0, 0.12, 0},
             {0.04, 0.02, 0}, {0.18, 0.03, 0}, {0.16, 0.08, 0}, {0.08, 0.08, 0}};
   mesh.elements = {{4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
@@ -249,8 +249,8 @@ TEST_CASE("the twisted beam bends as beam theory says")
 
 TEST_CASE("a thin twisted beam does not lock as quadrilaterals, though each is warped")
 {
-  CHECK(twisted_beam_tip(Shape::shell4, 0.0032, 1) == approx(5256, 0.02));
-  CHECK(twisted_beam_tip(Shape::shell4, 0.0032, 2) == approx(1294, 0.02));
+  CHECK(twisted_beam_tip(Shape::quad4, 0.0032, 1) == approx(5256, 0.02));
+  CHECK(twisted_beam_tip(Shape::quad4, 0.0032, 2) == approx(1294, 0.02));
 }
 
 TEST_CASE("the Scordelis-Lo roof sags by 0.3006 to 0.3024")

@@ -61,7 +61,7 @@ inline Mesh bricks(std::array<int, 3> n, const std::function<Vec3(double, double
 /// Lattice of quadrilaterals; `place` maps the unit square to space.
 inline Mesh quads(int nx, int ny, const std::function<Vec3(double, double)>& place)
 {
-  Mesh mesh{Shape::shell4, {}, {}};
+  Mesh mesh{Shape::quad4, {}, {}};
   for (int j = 0; j <= ny; ++j)
     for (int i = 0; i <= nx; ++i) mesh.x.push_back(place(double(i) / nx, double(j) / ny));
   for (int j = 0; j < ny; ++j)
@@ -148,7 +148,7 @@ inline Mesh in_shape(const Mesh& bricks, Shape shape)
 
 inline Mesh triangles(const Mesh& quads)
 {
-  return recut(quads, Shape::shell3, {{0, 1, 2}, {0, 2, 3}});
+  return recut(quads, Shape::triangle3, {{0, 1, 2}, {0, 2, 3}});
 }
 
 using Sparse = Eigen::SparseMatrix<double>;

@@ -36,8 +36,7 @@ void begin_run_control(const RunLimits& limits);
 void end_run_control();
 
 /// Whether the run is asked to end, agreed by all ranks. Collective, and cheap enough to be asked after every time
-/// step. Ranks talk after each step where steps take longer than a millisecond, else after every sixteenth. Of fewer
-/// ranks than work together nothing is ever asked.
+/// step. Of fewer ranks than work together nothing is ever asked.
 bool end_is_asked(MPI_Comm comm);
 
 /// After parts of the ranks have worked by themselves: throws Interrupted if any of them was asked to end. Collective
@@ -67,8 +66,7 @@ std::string who_asked_to_end();
 /// While one lives, nothing is asked: for short work without which what is known would be lost. By all ranks.
 Finally undisturbed();
 
-/// Calls a function of METIS, and again where it failed: METIS takes a SIGTERM during the call for an error of its own.
-/// Where it does not fail again, that request is noted. Returns its code. Not collective.
-int without_losing_signals(int success, const std::function<int()>& metis);
+/// While one lives, a SIGTERM waits: METIS would take it for an error of its own. Not collective.
+Finally without_sigterm();
 
 } // namespace squeal

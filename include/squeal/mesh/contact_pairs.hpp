@@ -52,7 +52,7 @@ ContactPairs make_pairs(const Mesh& mesh, const Scene& scene);
 struct Partition
 {
   std::vector<int> node_rank;
-  std::vector<int> element_rank; // the rank that owns most of the element's nodes
+  std::vector<int> element_rank; // the rank that owns its first node
 };
 
 /// Returns a partition by METIS, the same at every call. The two heaviest nodes of a pair, one of each side, have the

@@ -12,16 +12,21 @@
 namespace squeal
 {
 
-/// Shapes of elements. Nodes are ordered as gmsh numbers them: corners first, then mid-side nodes.
+/// Shapes of elements and their faces. Nodes are ordered as gmsh numbers them: corners first, then mid-side nodes.
+/// Elements are solids, or shells of 3 and 4 nodes.
 enum class Shape
 {
-  hex8,
-  wedge6,
-  hex20,
-  tet10,
+  line2,
+  line3,
+  triangle3,
+  quad4,
+  triangle6,
+  quad8,
   tet4,
-  shell4,
-  shell3,
+  tet10,
+  wedge6,
+  hex8,
+  hex20,
 };
 
 /// An element of a part.
@@ -32,19 +37,10 @@ struct Element
   std::array<int, 20> nodes{}; // indices in Mesh::nodes; the first node_count(shape) are used
 };
 
-/// Shapes of the faces of solids, which are those of shells too. Nodes are ordered as gmsh numbers them.
-enum class FaceShape
-{
-  triangle3,
-  quad4,
-  triangle6,
-  quad8,
-};
-
 /// A face of a named surface. Its nodes are counter-clockwise seen from outside the solid it bounds.
 struct Face
 {
-  FaceShape shape{};
+  Shape shape{};
   std::array<int, 8> nodes{}; // indices in Mesh::nodes; the first node_count(shape) are used
   bool of_shell = false;      // counter-clockwise as the shell's nodes are, which may be seen from either side
 };

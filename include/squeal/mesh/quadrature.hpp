@@ -28,14 +28,12 @@ using Quadrature = std::vector<QuadraturePoint>;
 /// Returns the full integration of the stiffness; it is exact where the Jacobian is constant.
 const Quadrature& stiffness_rule(Shape shape);
 
-/// Returns a rule that is exact for N_i N_j det(J) where the sides are straight.
+/// Returns a rule that is exact for N_i N_j det(J) where the sides are straight, and for N_i times the area vector of a
+/// face, whether its sides are straight or curved.
 const Quadrature& mass_rule(Shape shape);
 
 /// Returns the rule of n x n points on the unit triangle, n = 3 or 4, with the functions of a 3-node triangle. It is
 /// exact to degree 2 n - 2.
 const Quadrature& triangle_rule(int n);
-
-/// Returns a rule that is exact for N_i times the area vector, whether the sides are straight or curved.
-const Quadrature& area_rule(FaceShape shape);
 
 } // namespace squeal
