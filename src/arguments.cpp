@@ -28,7 +28,7 @@ SceneKeys keys_of(Arguments& a)
       {"--checkpoint", &a.limits.checkpoint_interval, "S", "seconds between checkpoints [600]", Rule::positive},
       {"--restart", &a.restart, "switch",
        "goes on from the checkpoints of a run that ended early or was killed, if there are any"},
-      {"--verbose", &a.verbose, "switch", "prints every result before the short table; -v as well"},
+      {"--verbose", &a.verbose, "switch", "prints every result; -v as well"},
       {"--version", &a.version, "switch", "versions of squeal and of the libraries it runs on"},
       {"--help", &a.help, "switch",
        "this text; -help and -h as well; --help mesh: the keys of [mesh], or of another table"},
@@ -37,8 +37,8 @@ SceneKeys keys_of(Arguments& a)
       {"--allow-scripts", &a.allow_scripts, "switch",
        "lets the scene's geometry run commands and write files, as gmsh's statements can"},
       {"--force", &a.force, "switch", "runs even where the forecast says more than a day, or more memory than is free"},
-      {"--dry-run", &a.dry_run, "switch",
-       "checks scene and mesh, prints the resolved scene, the model's size and the forecast, and stops"},
+      {"--dry-run", &a.dry_run, "switch", "checks scene and mesh, prints the model's size and the forecast, and stops"},
+      {"--resolve", &a.resolve, "switch", "with --dry-run: prints the scene as well, every default written out"},
   };
 }
 
@@ -79,7 +79,9 @@ std::string unknown_argument(const std::string& word)
   const std::string unknown = "unknown argument " + shortened(word);
   if (asks_for_ranks(word))
     return unknown + "; ranks are given before the program: RANKS=4 tools/run SCENE, or mpirun -n 4 squeal SCENE";
-  const std::string hint = spelling_hint(word.substr(0, 40), argument_names());
+  const std::vector<std::string> names = argument_names();
+  const auto whole = std::ranges::find_if(names, [&](const std::string& name) { return name.starts_with(word); });
+  const std::string hint = spelling_hint(whole == names.end() ? word.substr(0, 40) : *whole, names);
   return unknown + (hint.empty() ? "; squeal -help lists the arguments" : hint);
 }
 

@@ -171,6 +171,7 @@ int run_program(const Arguments& arguments)
     std::printf("options come from the command line and from the variable PETSC_OPTIONS\n");
   ProgramOptions options = read_program_options(comm);
   options.force = arguments.force;
+  options.resolve = arguments.resolve;
   options.length = arguments.verbose ? TableLength::full : TableLength::brief;
   options.program = arguments.program;
   options.command = arguments.command;

@@ -194,9 +194,7 @@ ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results,
 
 void dry_run(Scene scene, const ProgramOptions& options, MPI_Comm comm)
 {
-  if (rank_of(comm) == 0) std::printf("# the scene, every default written out\n%s\n", resolved_scene(scene).c_str());
   const Model model = build_model(scene, comm);
-  if (rank_of(comm) == 0) std::printf("# the model\n");
   print_model(summary_with_doubts(model, scene, comm), comm);
   refuse_undriven_pairs(scene, model.interface);
   check_starts(scene, model);
@@ -204,6 +202,8 @@ void dry_run(Scene scene, const ProgramOptions& options, MPI_Comm comm)
   if (rank_of(comm) == 0) std::printf("%s", text_of(forecast).c_str());
   const std::string problem = problem_of(forecast, comm);
   if (rank_of(comm) == 0 && !problem.empty()) std::printf("  WARNING: here %s\n", problem.c_str());
+  if (rank_of(comm) == 0 && options.resolve)
+    std::printf("# the scene, every default written out\n%s", resolved_scene(scene).c_str());
 }
 
 } // namespace squeal

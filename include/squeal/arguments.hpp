@@ -28,8 +28,8 @@ struct Arguments
   RunLimits limits;
   std::string section;          // of the keys that --help shows; empty: all of the help
   std::string program, command; // as a shell takes them; the command begins with the program
-  bool verbose = false, restart = false, dry_run = false, help = false, version = false, allow_scripts = false,
-       force = false;
+  bool verbose = false, restart = false, dry_run = false, resolve = false, help = false, version = false,
+       allow_scripts = false, force = false;
   ReferencePage reference{};        // to print
   bool options_in_variable = false; // PETSC_OPTIONS
   std::string problem;              // said after MPI is up, once

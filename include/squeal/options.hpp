@@ -22,6 +22,7 @@ struct ProgramOptions
   CycleOptions cycle;
   SettledOptions settled;
   bool force = false;               // --force: run whatever the forecast says
+  bool resolve = false;             // --resolve: a dry run prints the scene
   TableLength length{};             // --verbose: full
   std::string program{}, command{}; // by which the program was called
   ResponseOptions response;

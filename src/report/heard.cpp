@@ -90,15 +90,23 @@ std::string energy_text(const MeanValue& energy)
   return format(", mean energy %.*g +- %.0e J", digits, energy.value, energy.error);
 }
 
-/// A motion that starts lead to and that is not the answer, the one that most of them lead to; empty: there is none.
-template <class IsOther> std::string starts_beside(const Report& report, const char* to, const IsOther& is_other)
+/// Where most of the starts lead that do not lead to the answer; empty: all that have settled lead to it.
+template <class IsAnswer> std::string starts_text(const Report& report, const char* to, const IsAnswer& is_answer)
 {
-  const Attractors& attractors = report.attractors;
-  if (!has_run(attractors.outcome)) return {};
-  const auto other = std::ranges::find_if(attractors.motions, is_other); // those that most starts lead to come first
-  if (other == attractors.motions.end()) return {};
-  return format(", but %zu of %zu starts lead to a %s at %.5g Hz, mean energy %.3g J", other->starts.size(),
-                attractors.starts.size(), to, other->frequency.value, other->energy.value);
+  std::size_t settled = 0;
+  const ReachedMotion* other = nullptr;
+  for (const ReachedMotion& motion : report.attractors.motions) // by falling number of starts
+  {
+    const bool same = is_answer(motion);
+    if (motion.kind == ReachedKind::unsettled && !same) continue; // it may still come there
+    settled += motion.starts.size();
+    if (!same && !other) other = &motion;
+  }
+  if (!has_run(report.attractors.outcome) || !other) return {};
+  return format(", but %zu of %zu starts lead to ", other->starts.size(), settled) +
+         (other->kind == ReachedKind::rest
+              ? "rest"
+              : format("a %s at %.5g Hz, mean energy %.3g J", to, other->frequency.value, other->energy.value));
 }
 
 /// A cycle that starts lead to in place of the settled motion.
@@ -107,9 +115,9 @@ std::string steady_starts_text(const Report& report)
   const SettledMotion& settled = report.motion.settled;
   const MeanValue energy{settled.fluctuating_energy.value, settled.fluctuating_energy.error + settled.step_error},
       frequency{settled.examined.base.first, 0};
-  return starts_beside(report, "cycle",
-                       [&](const ReachedMotion& motion)
-                       { return motion.kind == ReachedKind::steady && !is_cycle(motion, energy, frequency); });
+  return starts_text(report, "cycle",
+                     [&](const ReachedMotion& motion)
+                     { return motion.kind != ReachedKind::steady || is_cycle(motion, energy, frequency); });
 }
 
 std::string settled_text(const Report& report, const Scene& scene)
@@ -153,34 +161,16 @@ MeanValue with_step_error(double value, double relative)
   return {value, std::isfinite(relative) ? relative * value : 0};
 }
 
-/// How many of the scene's other starts lead to the cycle, and where most of the others lead; empty: all that have
-/// settled lead to it.
-std::string starts_text(const Report& report)
+/// What starts lead to in place of the cycle. Means agree; steps that do not fit the period may keep a motion on a
+/// slowly attracting cycle varying.
+std::string starts_beside_cycle(const Report& report)
 {
-  const Attractors& attractors = report.attractors;
   const LimitCycle& cycle = report.motion.cycle;
   const Fidelity& fidelity = report.motion.fidelity;
-  if (!has_run(attractors.outcome) || attractors.motions.empty()) return {};
   const MeanValue energy = with_step_error(cycle.measured.mean_fluctuating_energy, fidelity.step_energy_error),
                   frequency = with_step_error(1 / cycle.orbit.period, fidelity.step_frequency_error);
-  std::size_t all = 0, here = 0;
-  const ReachedMotion* other = nullptr; // they come by falling number of starts
-  for (const ReachedMotion& motion : attractors.motions)
-  {
-    const bool same = is_cycle(motion, energy, frequency);
-    if (motion.kind == ReachedKind::unsettled && !same) continue; // it may still come there
-    all += motion.starts.size();
-    if (same) // means agree; steps that do not fit the period may keep a motion on a slowly attracting cycle varying
-      here += motion.starts.size();
-    else if (!other)
-      other = &motion;
-  }
-  if (here == all) return {};
-  const std::string elsewhere = other->kind == ReachedKind::rest ? "rest"
-                                                                 : format("%.5g Hz, mean energy %.3g J",
-                                                                          other->frequency.value, other->energy.value);
-  return format(", which %zu of %zu other starts lead%s to (%zu to %s)", here, all, here == 1 ? "s" : "",
-                other->starts.size(), elsewhere.c_str());
+  return starts_text(report, "motion",
+                     [&](const ReachedMotion& motion) { return is_cycle(motion, energy, frequency); });
 }
 
 /// The errors of the steps, where one is above the accuracy.
@@ -199,17 +189,9 @@ std::string cycle_sentence(const Report& report, const Scene& scene)
   const double frequency = 1 / cycle.orbit.period;
   return format("squeals at %.5g Hz", frequency) + beside_mode(report, frequency) +
          largest_swing(scene, cycle.measured.peak_to_peak, [](double swing) { return swing; }) +
-         stability_text(cycle.multipliers) + starts_text(report) +
+         stability_text(cycle.multipliers) + starts_beside_cycle(report) +
          (report.point.modes.unstable_count == 0 ? ", beside a stable equilibrium that another start leads to" : "") +
          missed_accuracy(report.motion.fidelity);
-}
-
-/// The motion that most of the starts lead to beside a stable equilibrium; empty: all that have settled come to rest.
-std::string beside_rest(const Report& report)
-{
-  return starts_beside(report, "motion",
-                       [](const ReachedMotion& motion)
-                       { return motion.kind == ReachedKind::steady || motion.kind == ReachedKind::varying; });
 }
 
 /// Why friction cannot feed a motion; empty: it may, or something else does, such as another code's friction in K.
@@ -235,7 +217,9 @@ std::string linear_text(const Report& report)
   if (const std::string text = without_friction(report); !text.empty()) return text;
   if (report.point.modes.unstable_count == 0)
     return report.point.modes.outcome.kind == OutcomeKind::converged
-               ? "silent: no mode grows in the band" + beside_rest(report)
+               ? "silent: no mode grows in the band" + starts_text(report, "motion",
+                                                                   [](const ReachedMotion& motion)
+                                                                   { return motion.kind == ReachedKind::rest; })
                : "nothing is known: the modes are incomplete";
   const ComplexMode& mode = report.point.modes.modes.front();
   if (mode.frequency_hz() == 0)
@@ -254,7 +238,7 @@ std::string options_to_go_on(const Report& report, const Scene& scene)
     return format(" --set friction.coefficient=%g", scene.friction.coefficient / 2);
   if (has_run(modes.outcome) && !without_friction(report).empty()) return {};
   if (modes.outcome.kind == OutcomeKind::not_converged) return " --set modes.method=toar";
-  if (has_motion && report.motion.cycle.multipliers.stability == Stability::undecided)
+  if (cycle == OutcomeKind::converged && report.motion.cycle.multipliers.stability == Stability::undecided)
     return " -cycle_watched_periods 200";
   if (has_motion || has_study || !has_run(modes.outcome)) return {};
   if (has_run(report.motion.cycle.outcome) && modes.unstable_count > 0)

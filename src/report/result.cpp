@@ -11,21 +11,6 @@ namespace squeal
 namespace
 {
 
-/// Adds the values of a group, which is in groups of the names `place`, to the columns that they belong to.
-void add_cells(const Result& group, const std::string& place, std::size_t row, std::vector<Column>& columns)
-{
-  for (const Result& part : group.parts)
-  {
-    const std::string name = place + part.name;
-    if (part.kind == Result::Kind::group) add_cells(part, name + " ", row, columns);
-    if (part.kind != Result::Kind::value) continue;
-    auto column = std::ranges::find(columns, name, &Column::name);
-    if (column == columns.end()) column = columns.insert(column, {name, &part, {}});
-    column->cells.resize(row);
-    column->cells.push_back(&part);
-  }
-}
-
 std::string csv_text(const std::string& text)
 {
   std::string quoted = "\"";
@@ -57,8 +42,8 @@ void add_page_rows(const Result& result, const std::string& place, std::string& 
   if (result.kind == Result::Kind::value)
     rows += markdown_row({markdown_code(name + (result.value.is_array() ? "[]" : "")), result.unit,
                           result.meaning + (result.words.empty() ? "" : ": " + words_text(result.words))});
-  const bool is_list = result.kind == Result::Kind::list || result.kind == Result::Kind::curve;
-  for (const Result& part : result.parts) add_page_rows(part, name + (is_list ? "[]" : ""), rows);
+  for (const Result& part : result.parts)
+    add_page_rows(part, name + (result.kind == Result::Kind::list ? "[]" : ""), rows);
 }
 
 } // namespace
@@ -138,26 +123,17 @@ Json json_of(const Result& result)
   return json;
 }
 
-std::vector<Column> columns_of(const Result& list)
-{
-  std::vector<Column> columns;
-  for (std::size_t row = 0; const Result& group : list.parts) add_cells(group, "", row++, columns);
-  for (Column& column : columns) column.cells.resize(list.parts.size());
-  return columns;
-}
-
 std::string csv_of(const Result& list)
 {
-  std::vector<Column> columns = columns_of(list);
-  std::erase_if(columns, [](const Column& column) { return column.first->value.is_array(); });
+  std::vector<std::string> names; // of all groups
+  for (const Result& group : list.parts)
+    for (const Result& part : group.parts)
+      if (!part.value.is_array() && std::ranges::find(names, part.name) == names.end()) names.push_back(part.name);
   std::string text;
-  const auto add = [&](const Column& column, const std::string& cell)
-  { text.append(&column == &columns.front() ? "" : ",").append(cell); };
-  for (const Column& column : columns) add(column, csv_text(column.first->name));
-  text += '\n';
-  for (std::size_t row = 0; row < list.parts.size(); ++row, text += '\n')
-    for (const Column& column : columns) add(column, csv_cell(column.cells[row]));
-  return text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ",") + csv_text(name);
+  for (const Result& group : list.parts)
+    for (std::size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "\n" : ",") + csv_cell(group.part(names[i]));
+  return text + "\n";
 }
 
 std::string page_rows(const Result& result)

@@ -35,7 +35,6 @@ struct Result
     value,
     group,
     list,
-    curve, // a list whose order is a way: the table shows entries spread along it
   };
   /// Place of a value in the printed table.
   enum class Place
@@ -104,9 +103,10 @@ public:
     return result;
   }
 
-  /// A result that tells whether others can be trusted; the short table names those that did not pass.
+  /// A result that tells whether others can be trusted; the short table names those that did not pass. `passed`: none
+  /// where nothing rests on it.
   template <class... Description>
-  void check(bool passed, const std::string& name, const Description&... description) const
+  void check(std::optional<bool> passed, const std::string& name, const Description&... description) const
   {
     Result& result = show(name, description...);
     if (shown_) result.passed = passed;
@@ -141,12 +141,6 @@ public:
     if (is_example()) fill(entry.group(""), Items{}...);
   }
 
-  template <class Fill, class Item> void curve(const std::string& name, Fill fill, const std::vector<Item>& items) const
-  {
-    list(name, fill, items);
-    at_.parts.back().kind = Result::Kind::curve;
-  }
-
 private:
   Result& at_;
   const Scene& scene_;
@@ -157,18 +151,7 @@ private:
 /// The tree as JSON.
 Json json_of(const Result& result);
 
-/// One value of every group of a list; null where a group lacks it.
-struct Column
-{
-  std::string name; // behind the names of the groups that it stands in
-  const Result* first = nullptr;
-  std::vector<const Result*> cells;
-};
-
-/// The columns of a list, those of groups in its groups among them.
-std::vector<Column> columns_of(const Result& list);
-
-/// A list as CSV: a head, and a line a group. What is not known is empty.
+/// A list of groups of values as CSV: a head, and a line a group. What is not known, or is a list, is empty.
 std::string csv_of(const Result& list);
 
 /// Rows of the page: name, unit and meaning of each value.

@@ -73,9 +73,9 @@ void add_mode_error(Entry out, const ModeOnFinerMesh& mode)
   out.add("other_growth_rate", "1/s", "the growth rate with other closed pairs than its own that it may have",
           mode.other.real());
   out.brief("corrected_frequency_hz", "Hz", "the frequency where both meshes lead", frequency_hz_of(mode.corrected()));
-  out.error("frequency_error", "its bar", mode.bar().imag() / two_pi).is_brief = true;
+  out.error("frequency_error", "its bar", mode.bar().imag() / two_pi);
   out.brief("corrected_growth_rate", "1/s", "the growth rate where both meshes lead", mode.corrected().real());
-  out.error("growth_error", "its bar", mode.growth_bar()).is_brief = true;
+  out.error("growth_error", "its bar", mode.growth_bar());
   out.show("undecided", "switch", "the bar holds zero growth, or growth of the other sign", mode.is_undecided());
   out.add("backward_error", "-", "backward error on the finer mesh", mode.backward_error);
 }

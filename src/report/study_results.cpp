@@ -190,7 +190,7 @@ void add_branch(Entry out, const Report& report)
   const Entry ends = out.group("ends");
   ends.show("backward", "why the side towards smaller values ended", branch.ends.backward);
   ends.show("forward", "why the side towards larger values ended", branch.ends.forward);
-  out.curve("points", add_branch_point, branch.points);
+  out.list("points", add_branch_point, branch.points);
   out.list("events", add_event, branch.events);
   std::vector<EquilibriumStability> known = found.equilibria;
   std::erase_if(known, [](const EquilibriumStability& equilibrium) { return !equilibrium.known; });

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <utility>
 
 namespace squeal
 {
@@ -20,6 +21,7 @@ struct Track
   SweptMode mode{};
   int points = 0, unstable = 0; // where it was found, and where it is unstable
   double least_mac = 1;
+  const SweepPoint* last = nullptr; // of these
 };
 
 /// Those that are unstable somewhere, by rising number.
@@ -31,6 +33,8 @@ std::vector<Track> unstable_tracks(const Sweep& sweep)
     {
       if (mode.track < 0) continue;
       Track& track = tracks[{mode.track, point.reversed}];
+      if (std::exchange(track.last, &point) == &point)
+        continue; // design points have several of one name; the first grows most
       track.number = mode.track;
       track.unstable += is_unstable(mode.lambda);
       track.least_mac = std::min(track.least_mac, mode.mac);
@@ -182,12 +186,12 @@ void add_sweep(Entry out, const Report& report)
   for (const std::string& key : settings.key)
   {
     const NumberDescription number = description_of(out.scene(), key);
-    names.push_back(number.name);
+    names.push_back(number.name.empty() ? key : number.name);
     units.push_back(number.unit);
   }
   const auto unstable = std::ranges::count_if(sweep.points, [](const SweepPoint& point) { return point.unstable > 0; });
   out.show("keys", "text", "numbers that are swept", settings.key);
-  out.show("names", "text", "a name for the place in each key; empty where the key says it", names);
+  out.show("names", "text", "what each is of, by its name; the key where that says it", names);
   out.show("units", "text", "unit of each", units);
   out.add("stages", "stages at each point, as the scene says", settings.stages);
   out.add("directions", "directions of rotation, as the scene says", settings.directions);
@@ -200,7 +204,7 @@ void add_sweep(Entry out, const Report& report)
   out.show("residual", "-", "largest backward error of right and left vectors", sweep.outcome.residual);
   out.add("basis_shapes", "-", "shapes of the basis in the end", sweep.basis);
   out.add("basis_corrections", "-", "corrections of the basis by residuals", sweep.passes);
-  out.curve("points", add_point, sweep.points);
+  out.list("points", add_point, sweep.points);
   out.list("unstable_tracks", add_track, unstable_tracks(sweep));
   out.list("thresholds", add_threshold, sweep.thresholds);
 }

@@ -1,9 +1,9 @@
-/// The table a person reads at the end of a run: the answer, a row for each stage, and the next command. In full, a row
-/// for each result stands before.
+/// The table a person reads at the end of a run: the answer, rows for each stage, and the next command.
 #include "results.hpp"
 
 #include <cctype>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 
 namespace squeal
@@ -15,12 +15,45 @@ namespace
 using Kind = Result::Kind;
 using Place = Result::Place;
 
-constexpr std::size_t list_rows = 12, curve_rows = 24, list_groups = 3; // that are shown
-constexpr int name_width = 27, value_width = 22, all_digits = 7;
+constexpr std::size_t width = 100; // letters of a row
 
-std::string stage_row(const std::string& head, const std::string& text)
+/// What a table shows.
+struct Shown
 {
-  return text.empty() ? "  " + head + "\n" : format("  %-12s ", head.c_str()) + text + "\n";
+  bool all = false;         // of the results that a person reads; else the brief ones
+  std::size_t rows = 3;     // of a list
+  std::size_t warnings = 4; // no more than a reader takes in
+  int digits = 5;
+};
+
+constexpr Shown shown_in(TableLength length)
+{
+  return length == TableLength::full ? Shown{true, 12, SIZE_MAX, 7} : Shown{};
+}
+
+std::string row(const std::string& head, const std::string& text)
+{
+  return format("  %-12s ", head.c_str()) + text + "\n";
+}
+
+/// Pieces in rows, as many to a row as fit.
+std::vector<std::string> packed_rows(const std::vector<std::string>& pieces, const std::string& separator)
+{
+  std::vector<std::string> rows;
+  for (const std::string& piece : pieces)
+    if (!rows.empty() && rows.back().size() + piece.size() < width)
+      rows.back() += separator + piece;
+    else
+      rows.push_back(piece);
+  return rows;
+}
+
+/// Rows behind one head.
+std::string rows_text(const std::string& head, const std::vector<std::string>& rows)
+{
+  std::string text;
+  for (const std::string& one : rows) text += row(text.empty() ? head : "", one);
+  return text;
 }
 
 /// A name in words, without its unit.
@@ -60,99 +93,6 @@ std::string value_text(const Json& value, const Result& result, int digits)
   return text;
 }
 
-/// Whether anything of it is shown.
-bool is_shown(const Result& result)
-{
-  return result.place != Place::none || std::ranges::any_of(result.parts, is_shown);
-}
-
-bool is_list(const Result& result)
-{
-  return (result.kind == Kind::list || result.kind == Kind::curve) && is_shown(result);
-}
-
-/// Places of the entries of a list that are shown: the first ones, of a curve some that are spread evenly.
-std::vector<std::size_t> shown_places(const Result& list)
-{
-  const std::size_t size = list.parts.size(), most = list.kind == Kind::curve ? curve_rows : list_rows;
-  std::vector<std::size_t> places;
-  for (std::size_t i = 0; i < std::min(size, most); ++i)
-    places.push_back(list.kind == Kind::curve && size > most ? i * (size - 1) / (most - 1) : i);
-  return places;
-}
-
-/// A list as columns below their names and units.
-std::string columns_text(const Result& list)
-{
-  const std::vector<std::size_t> places = shown_places(list);
-  std::vector<std::string> rows(places.size() + 2);
-  for (const Column& column : columns_of(list))
-  {
-    const Result& first = *column.first;
-    if (first.place == Place::none) continue;
-    const std::string unit = unit_text(first);
-    std::vector<std::string> cells = {label(column.name), unit.empty() ? "" : "[" + unit + "]"};
-    for (const std::size_t i : places)
-      cells.push_back(column.cells[i] ? value_text(column.cells[i]->value, first, all_digits) : "");
-    if (std::all_of(cells.begin() + 2, cells.end(), [](const std::string& cell) { return cell.empty(); })) continue;
-    std::size_t width = 0;
-    for (const std::string& cell : cells) width = std::max(width, cell.size());
-    const bool is_text = first.unit == "text" || first.unit == "word";
-    for (std::size_t i = 0; i < cells.size(); ++i)
-    {
-      const std::string space(width - cells[i].size(), ' ');
-      rows[i] += "  " + (is_text ? cells[i] + space : space + cells[i]);
-    }
-  }
-  std::string text;
-  for (const std::string& row : rows)
-    if (const std::size_t end = row.find_last_not_of(' '); end != std::string::npos)
-      text += "    " + row.substr(0, end + 1) + "\n";
-  if (places.size() < list.parts.size())
-    text += format("      %zu of %zu; report.json has all\n", places.size(), list.parts.size());
-  return text;
-}
-
-/// "    frequency   4840.5 Hz   meaning"; a text needs no meaning.
-std::string value_row(const std::string& name, const Result& result, const Result* error, std::string meaning)
-{
-  std::string value = value_text(result.value, result, all_digits);
-  if (value.empty()) return "";
-  if (const std::string bar = error ? value_text(error->value, *error, all_digits) : ""; !bar.empty())
-    value += " +- " + bar;
-  if (const std::string unit = unit_text(result); !unit.empty()) value += " " + unit;
-  std::erase(meaning, '`');
-  return format("    %-*s ", name_width, name.c_str()) +
-         (result.unit == "text" || meaning.empty() ? value : format("%-*s ", value_width, value.c_str()) + meaning) +
-         "\n";
-}
-
-/// The shown parts of a group, each behind the names of the groups that it is in.
-std::string group_text(const Result& group, const std::string& place)
-{
-  std::string text;
-  std::string meaning; // of the row before: it is not said again
-  for (auto part = group.parts.begin(); part != group.parts.end(); ++part)
-  {
-    const std::string name = place + (part->name == "mean" ? "" : (place.empty() ? "" : " ") + label(part->name));
-    if (part->place == Place::row)
-    {
-      const auto next = std::next(part);
-      const bool has_bar = next != group.parts.end() && next->place == Place::error_bar;
-      text += value_row(name, *part, has_bar ? &*next : nullptr, meaning == part->meaning ? "" : part->meaning);
-      meaning = part->meaning;
-    }
-    else if (part->kind == Kind::group)
-      text += group_text(*part, name);
-    else if (is_list(*part) && !std::ranges::any_of(part->parts.front().parts, is_list))
-      text += "    " + name + "\n" + columns_text(*part);
-    else if (is_list(*part))
-      for (std::size_t i = 0; const Result& one : part->parts)
-        if (i++ < list_groups) text += format("    %s %zu\n", name.c_str(), i) + group_text(one, "");
-  }
-  return text;
-}
-
 /// "converged", "NOT CONVERGED: reason": what is not a success must not look like one.
 std::string outcome_text(const Result& outcome, const Result* reason)
 {
@@ -172,96 +112,82 @@ std::string warning_row(const std::string& severity, const std::string& sentence
   return head + ": " + sentence + "\n";
 }
 
-/// The warnings of a stage in one severity, or in all where it is empty.
+/// The warnings of a stage in one severity.
 std::vector<std::string> warnings_of(const Result& stage, const std::string& severity)
 {
   std::vector<std::string> rows;
   const Result *sentences = stage.part("warnings"), *severities = stage.part("severities");
   for (std::size_t i = 0; sentences && i < sentences->value.size(); ++i)
-    if (const std::string own = severities->value[i].get<std::string>(); severity.empty() || own == severity)
+    if (const std::string own = severities->value[i].get<std::string>(); own == severity)
       rows.push_back(warning_row(own, sentences->value[i].get<std::string>()));
   return rows;
 }
 
-/// A stage with what is shown of it, and its warnings; nothing of one that is off.
-std::string stage_text(const Result& stage)
+/// The shown values of a group, "a text" or "name 1 unit +- error"; of its groups behind their names.
+std::vector<std::string> values_of(const Result& group, const std::string& place, const Shown& shown)
 {
-  const Result* outcome = stage.part("outcome");
-  const bool is_off = outcome && outcome->value == word(OutcomeKind::off);
-  if (is_off || (!outcome && !is_shown(stage))) return "";
-  std::string text = stage_row(stage.name, outcome ? outcome_text(*outcome, stage.part("reason")) : "");
-  text += group_text(stage, "");
-  for (const std::string& row : warnings_of(stage, "")) text += "    " + row;
-  return text;
-}
-
-std::string timings_text(const Report& report)
-{
-  std::string text = stage_row("time", "");
-  for (const auto& [stage, seconds, processor_seconds] : report.timings)
-    if (seconds >= 0.01) text += format("    %-*s %.2f s\n", name_width, word(stage), seconds);
-  return text;
-}
-
-/// The brief values of a group, "a text, name 1 unit"; of its groups behind their names.
-std::string brief_values(const Result& group, const std::string& place)
-{
-  std::string text;
-  const auto add = [&](const std::string& one) { text += (text.empty() || one.empty() ? "" : ", ") + one; };
+  std::vector<std::string> values;
+  bool is_last_shown = false;
   for (const Result& part : group.parts)
   {
-    const std::string name = place + label(part.name), unit = unit_text(part);
-    if (part.kind == Kind::group) add(brief_values(part, name + " "));
-    if (!part.is_brief) continue;
-    if (const std::string value = value_text(part.value, part, 5); !value.empty())
-      add((part.value.is_string() ? "" : name + " ") + value + (unit.empty() ? "" : " " + unit));
+    const std::string name = place + (part.name == "mean" && !place.empty() ? "" : label(part.name) + " ");
+    if (part.kind == Kind::group) std::ranges::copy(values_of(part, name, shown), std::back_inserter(values));
+    const std::string value = part.place == Place::none ? "" : value_text(part.value, part, shown.digits),
+                      unit = unit_text(part);
+    if (part.place == Place::error_bar && is_last_shown && !value.empty()) values.back() += " +- " + value;
+    if (part.place == Place::error_bar) continue;
+    is_last_shown = !value.empty() && (shown.all || part.is_brief);
+    if (is_last_shown)
+      values.push_back((part.value.is_string() && !shown.all ? "" : name) + value + (unit.empty() ? "" : " " + unit));
   }
+  return values;
+}
+
+std::string joined(const std::vector<std::string>& pieces)
+{
+  std::string text;
+  for (const std::string& piece : pieces) text += (text.empty() ? "" : ", ") + piece;
   return text;
 }
 
-/// The brief entries of a list, as many to a row as fit.
-std::string brief_list(const Result& list)
+std::string lists_text(const Result& group, const Shown& shown);
+
+/// The entries of a list, several to a row; of a full table each in a row of its own, with the lists in it.
+std::string list_text(const Result& list, const Shown& shown)
 {
-  constexpr std::size_t width = 100, most = 3; // letters of a row; rows
-  std::vector<std::string> rows;
-  std::size_t entries = 0, shown = 0;
+  std::vector<std::string> entries, inner;
   for (const Result& one : list.parts)
-  {
-    const std::string values = brief_values(one, "");
-    if (values.empty()) continue;
-    ++entries;
-    const bool fits = !rows.empty() && rows.back().size() + values.size() < width;
-    if (!fits && rows.size() == most) continue;
-    if (fits)
-      rows.back() += "; " + values;
-    else
-      rows.push_back(values);
-    ++shown;
-  }
-  if (shown < entries) rows.back() += format("; and %zu more", entries - shown);
+    if (const std::string values = joined(values_of(one, "", shown)); !values.empty())
+    {
+      entries.push_back(values);
+      inner.push_back(shown.all ? lists_text(one, shown) : "");
+    }
+  std::vector<std::string> rows = shown.all ? entries : packed_rows(entries, "; ");
+  if (rows.size() > shown.rows) rows[shown.rows - 1] += "; and more, in report.json";
   std::string text;
-  for (const std::string& row : rows) text += stage_row("  " + (text.empty() ? label(list.name) : ""), row);
+  for (std::size_t i = 0; i < std::min(shown.rows, rows.size()); ++i)
+    text += row("  " + (i == 0 ? label(list.name) : ""), rows[i]) + (shown.all ? inner[i] : "");
   return text;
 }
 
-/// The brief lists of a group and of the groups and lists in it.
-std::string brief_lists(const Result& group)
+/// The lists of a group and of the groups in it.
+std::string lists_text(const Result& group, const Shown& shown)
 {
   std::string text;
   for (const Result& part : group.parts)
-    text += part.kind == Kind::list ? brief_list(part) : part.kind == Kind::group ? brief_lists(part) : "";
+    text += part.kind == Kind::list ? list_text(part, shown) : part.kind == Kind::group ? lists_text(part, shown) : "";
   return text;
 }
 
-/// A row for a stage that has run, and rows for its lists.
-std::string brief_stage(const Result& stage)
+/// Rows of a stage: its values, and its lists. A stage that is off has none, in the brief table one that was skipped.
+std::string stage_text(const Result& stage, const Shown& shown)
 {
   const Result* outcome = stage.part("outcome");
-  if (outcome && (outcome->value == word(OutcomeKind::off) || outcome->value == word(OutcomeKind::skipped))) return "";
-  std::string row = outcome ? outcome_text(*outcome, stage.part("reason")) : "";
-  const std::string values = brief_values(stage, ""), lists = brief_lists(stage);
-  row += (row.empty() || values.empty() ? "" : ", ") + values;
-  return (row.empty() ? "" : stage_row(stage.name, row)) + lists;
+  const auto is = [&](OutcomeKind kind) { return outcome && outcome->value == word(kind); };
+  if (is(OutcomeKind::off) || (!shown.all && is(OutcomeKind::skipped))) return "";
+  std::vector<std::string> values = values_of(stage, "", shown);
+  if (outcome) values.insert(values.begin(), outcome_text(*outcome, stage.part("reason")));
+  return rows_text(stage.name, packed_rows(values, ", ")) + lists_text(stage, shown);
 }
 
 /// Counts the checks of a tree that were made, and names those that did not pass.
@@ -283,42 +209,48 @@ std::string checks_text(const Result& results)
   int passed = 0;
   std::vector<std::string> failed;
   count_checks(results, "", passed, failed);
-  std::string text = std::to_string(passed) + (failed.empty() ? " passed" : " passed, FAILED: ");
-  for (const std::string& name : failed) text += (&name == &failed.front() ? "" : ", ") + name;
-  return stage_row("checks", text);
+  return row("checks", std::to_string(passed) + " passed" + (failed.empty() ? "" : ", FAILED: " + joined(failed)));
 }
 
-/// The severest first, and no more than a reader takes in.
-std::string warnings_text(const Result& results)
+/// The severest first.
+std::string warnings_text(const Result& results, const Shown& shown)
 {
-  constexpr std::size_t most = 4;
   std::vector<std::string> rows;
   for (const Severity severity : {Severity::severe, Severity::warning, Severity::note})
     for (const Result& stage : results.parts)
       std::ranges::copy(warnings_of(stage, word(severity)), std::back_inserter(rows));
   std::string text;
-  for (std::size_t i = 0; i < std::min(most, rows.size()); ++i) text += "  " + rows[i];
-  return text + (rows.size() > most ? format("  %zu further remarks with --verbose\n", rows.size() - most) : "");
+  for (std::size_t i = 0; i < std::min(shown.warnings, rows.size()); ++i) text += "  " + rows[i];
+  return text + (rows.size() > shown.warnings
+                     ? format("  %zu further remarks with --verbose\n", rows.size() - shown.warnings)
+                     : "");
+}
+
+std::string timings_text(const Report& report, const Shown& shown)
+{
+  double whole = 0;
+  std::vector<std::string> parts;
+  for (const auto& [stage, seconds, processor_seconds] : report.timings)
+  {
+    whole += seconds;
+    if (shown.all && seconds >= 0.01) parts.push_back(format("%s %.2f s", word(stage), seconds));
+  }
+  parts.insert(parts.begin(), format("%.2f s", whole));
+  return rows_text("time", packed_rows(parts, ", "));
 }
 
 } // namespace
 
 std::string table(const Report& report, const Scene& scene, TableLength length)
 {
-  const std::string title = "\n" + (scene.title.empty() ? scene.file.filename().string() : scene.title) + "\n";
+  const Shown shown = shown_in(length);
   const Result results = results_of(report, scene);
-  std::string stages, text = title;
+  std::string text = "\n" + (scene.title.empty() ? scene.file.filename().string() : scene.title) + "\n" +
+                     row("heard", heard(report, scene));
   for (const Result& part : results.parts)
-    if (part.kind == Kind::group)
-    {
-      if (length == TableLength::full) text += stage_text(part);
-      stages += brief_stage(part);
-    }
-  if (length == TableLength::full) text += timings_text(report) + title;
-  double seconds = 0;
-  for (const Timing& timing : report.timings) seconds += timing.seconds;
-  return text + stage_row("heard", heard(report, scene)) + stages + checks_text(results) + warnings_text(results) +
-         stage_row("time", format("%.2f s", seconds)) + stage_row("next", next_command(report, scene));
+    if (part.kind == Kind::group) text += stage_text(part, shown);
+  return text + checks_text(results) + warnings_text(results, shown) + timings_text(report, shown) +
+         row("next", next_command(report, scene));
 }
 
 void print_table(const Report& report, const Scene& scene, TableLength length, MPI_Comm comm)

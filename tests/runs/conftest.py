@@ -62,6 +62,19 @@ class Run:
         return re.findall(r"^squeal: .*$", self.errors, re.M)
 
 
+class Short(Run):
+    """A run with the short table, as a user prints it."""
+
+    length = []
+
+    @property
+    def table(self):
+        return self.printed[self.printed.index("\n\n") + 2:].splitlines()
+
+    def row(self, name):
+        return next(line.split(maxsplit=1)[1] for line in self.table if line.split()[:1] == [name])
+
+
 def wait_for(condition, seconds=600):
     """Waits for an event; the seconds are a guard against a hang, not a limit that a slow machine meets."""
     end = time.monotonic() + seconds

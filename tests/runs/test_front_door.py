@@ -6,26 +6,13 @@ import subprocess
 
 import numpy as np
 import pytest
-from conftest import INPUTS, ROOT, Run
+from conftest import INPUTS, ROOT, Run, Short
 from test_early_errors import refused
 
 PIN = INPUTS / "pin_on_disc"
 QUICK = ["--set", "mesh.parameters.divisions=2"]
 MODES = [*QUICK, "--set", "cycle.enabled=false"]
 OWN = 'rotation = { axis = "z", rate = 20 }'
-
-
-class Short(Run):
-    """A run with the short table, as a user prints it."""
-
-    length = []
-
-    @property
-    def table(self):
-        return self.printed[self.printed.index("\n\n") + 2:].splitlines()
-
-    def row(self, name):
-        return next(line.split(maxsplit=1)[1] for line in self.table if line.split()[:1] == [name])
 
 
 def pin_scene(folder, *changes, more=""):
@@ -44,6 +31,7 @@ def test_the_table_has_at_most_twenty_lines(tmp_path, scene):
     run = Short([INPUTS / scene, "--set", "cycle.enabled=false", "--set", "transient.enabled=false"], 1, tmp_path)
     assert run.code == 0 and len(run.table) <= 21, run.printed  # the last line names the folder
     assert run.row("heard") == run.report["heard"] and run.row("next") == run.report["next"]
+    assert "100 %" not in run.printed  # what tells its progress still works
     assert re.search(r"^  checks +\d+ passed", run.printed, re.M) and re.search(r"^  time +[\d.]+ s", run.printed, re.M)
 
 
@@ -179,6 +167,12 @@ def test_one_dash_is_enough_and_a_misspelt_folder_is_known(squeal, tmp_path):
     (tmp_path / "pin_on_disc").mkdir()
     (tmp_path / "pin_on_disc" / "scene.toml").write_text("")
     refused(squeal(tmp_path / "pin_on_disk", ranks=1), f"did you mean '{tmp_path}/pin_on_disc'")
+    refused(squeal(PIN, "--vers", ranks=1), "did you mean '--version'?")
+
+
+def test_a_dry_run_prints_the_scene_where_it_is_asked_to(plain, converged):
+    resolved = converged(PIN, *QUICK, "--dry-run", "--resolve", ranks=1).printed
+    assert "[friction]" not in plain and resolved.index("memory forecast") < resolved.index("[friction]")
 
 
 @pytest.mark.parametrize("words, code, said", [(["--help"], 0, "tools/run SCENE"), (["--dry-run"], 1, "--dry-run stands before the scene")])

@@ -9,7 +9,7 @@ import tomllib
 
 import h5py
 import pytest
-from conftest import INPUTS, ROOT, Run
+from conftest import INPUTS, ROOT, Run, Short
 
 GUIDE, KEYS, RESULTS, FILES = (INPUTS / f"{name}.md" for name in ("README", "KEYS", "RESULTS", "RUNS"))
 
@@ -46,9 +46,9 @@ def same(quoted, printed):
     return all(agree(a, b, tolerance) for a, b in zip(NUMBER.findall(quoted), NUMBER.findall(printed)))
 
 
-def test_readme_prints_what_the_program_prints(converged):
+def test_readme_prints_what_the_program_prints(tmp_path):
     """Every line that README quotes of the pin on a disc is printed, in this order; rows of modes may be left out."""
-    run = converged(INPUTS / "pin_on_disc" / "scene.toml")
+    run = Short([INPUTS / "pin_on_disc" / "scene.toml"], 2, tmp_path)
     shown = run.printed.replace(str(run.output), "results/pin_on_disc").replace(os.environ["SQUEAL"], "build/squeal")
     left = iter(shown.splitlines())
     for quoted in block_of(ROOT / "README.md", "pin on disc"):

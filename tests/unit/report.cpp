@@ -64,8 +64,8 @@ Model one_of_each()
   add_element(mesh, Shape::tet10, {cube[0], cube[1], cube[3], cube[4]}, gmsh_tet, 2);
   add_element(mesh, Shape::hex8, cube, {}, 4);
   add_element(mesh, Shape::wedge6, {cube[0], cube[1], cube[3], cube[4], cube[5], cube[7]}, {}, 6);
-  add_element(mesh, Shape::shell4, {cube[0], cube[1], cube[2], cube[3]}, {}, 8);
-  add_element(mesh, Shape::shell3, {cube[0], cube[1], cube[2]}, {}, 10);
+  add_element(mesh, Shape::quad4, {cube[0], cube[1], cube[2], cube[3]}, {}, 8);
+  add_element(mesh, Shape::triangle3, {cube[0], cube[1], cube[2]}, {}, 10);
   mesh.points["tip"] = static_cast<int>(mesh.nodes.size());
   mesh.nodes.push_back({12, 0, 0});
   DofMap& dofs = model.dofs;
@@ -312,6 +312,46 @@ TEST_CASE(
   CHECK(has(failed, "FAILED: transient energy defect max 0.5"));
   CHECK(has(failed, "next         squeal scene --set transient.periods=400"));
   CHECK_FALSE(has(found, "no amplitude is predicted"));
+}
+
+TEST_CASE("the residual of a cycle fails no check below its tolerance, or where a settled motion is the answer")
+{
+  const Model model = one_of_each();
+  Report report = full_report(model);
+  report.program = "squeal";
+  report.command = "squeal scene";
+  report.motion.cycle.tolerance = 1e-5;
+  report.motion.cycle.outcome.kind = OutcomeKind::unstable_cycle;
+  report.motion.cycle.multipliers.stability = Stability::undecided;
+  const auto says = [&](const char* words)
+  { return table(report, scene_of_test(), TableLength::brief).find(words) != std::string::npos; };
+  report.motion.cycle.orbit.residual = 3.6e-6;
+  CHECK_FALSE(says("FAILED"));
+  report.motion.cycle.orbit.residual = 3.6e-5;
+  CHECK(says("FAILED: cycle residual full 3.6e-05"));
+  report.motion.cycle.outcome.kind = report.motion.settled.outcome.kind = OutcomeKind::settled;
+  CHECK_FALSE(says("FAILED"));
+  CHECK_FALSE(says("-cycle_watched_periods")); // the motion is known
+  CHECK(says("next         squeal report"));
+}
+
+TEST_CASE("a track counts points, also where several modes of a design point have its name; every number has a name")
+{
+  const Model model = one_of_each();
+  Report report = full_report(model);
+  Scene scene = scene_of_test();
+  scene.numbers["load"] = 100;
+  scene.sweep.emplace().key = {"numbers.load", "friction.coefficient"};
+  report.sweep.outcome.kind = OutcomeKind::converged;
+  for (const double growth : {5., -1.})
+    report.sweep.points.push_back(
+        {.values = {100, 0.3},
+         .outcome = {OutcomeKind::converged, "", 0, 0},
+         .modes = {{.lambda = {growth, 600}, .track = 0, .mac = 0.9}, {.lambda = {-2, 700}, .track = 0, .mac = 0.1}}});
+  const Json sweep = Json::parse(report_json(report, scene))["sweep"];
+  CHECK(sweep["unstable_tracks"][0]["points"] == 2);
+  CHECK(sweep["unstable_tracks"][0]["unstable_points"] == 1);
+  CHECK(sweep["names"] == Json{"numbers.load", "friction.coefficient"});
 }
 
 TEST_CASE("a folder that cannot be written is an error on every rank, and nothing is left half-written")

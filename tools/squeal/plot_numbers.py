@@ -14,7 +14,7 @@ def words_of(key, name=""):
     if section == "numbers":  # the scene's own words
         return rest[0].replace("_", " ")
     axis = f" along {'xyz'[int(rest.pop())]}" if len(rest) > 1 and rest[-1] in ("0", "1", "2") else ""
-    owner = "" if section in WHOLE or not rest else name or rest[0]
+    owner = "" if section in WHOLE or not rest else rest[0] if name in ("", key) else name
     inner = rest[1:] if section not in WHOLE else rest
     words = " ".join(WORDS.get(word, word.replace("_", " ")) for word in inner if word not in SILENT and not word.isdigit())
     kind = section.replace("_", " ")

@@ -44,7 +44,7 @@ def table_of(records: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
 
 def number_label(key: str, name: str = "", unit: str = "-") -> str:
     """A number of a scene as a reader knows it: its key, the name of what the key calls by its place, its unit."""
-    return key + (f" ({name})" if name else "") + (f" [{unit}]" if unit != "-" else "")
+    return key + (f" ({name})" if name not in ("", key) else "") + (f" [{unit}]" if unit != "-" else "")
 
 
 def hertz(frequency: float) -> str:

@@ -107,8 +107,8 @@ std::string next_command(const Report& report, const Scene& scene);
 /// The length of the printed table.
 enum class TableLength
 {
-  brief, // a line for each stage
-  full,  // before them a row for each result that a person reads
+  brief, // some twenty lines
+  full,  // all results that a person reads
 };
 
 /// The table a person reads, line by line.
