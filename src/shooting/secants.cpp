@@ -50,19 +50,20 @@ double norm(const BorderedSystem& system, const BorderedVector& z)
 /// Makes a direction of a step and appends it, unless less than a part `drop` of its change is new.
 bool append(const BorderedSystem& system, double drop, std::vector<Direction>& directions, Direction fresh)
 {
-  const double before = norm(system, fresh.change);
+  fresh.image = image_of(system.problem.flow, system.scales, fresh.change);
+  const auto length = [&] { return std::sqrt(plain_product(fresh.image, fresh.change)); };
+  const double before = length();
   for (int pass = 0; pass < 2; ++pass)
     for (const Direction& old : directions)
     {
       const double along = plain_product(old.image, fresh.change);
       add(-along, old.change, fresh.change);
+      add(-along, old.image, fresh.image);
       add(-along, old.step, fresh.step);
     }
-  const double left = norm(system, fresh.change);
+  const double left = length();
   if (!(left > drop * before)) return false;
-  scale(1 / left, fresh.change);
-  scale(1 / left, fresh.step);
-  fresh.image = image_of(system.problem.flow, system.scales, fresh.change);
+  for (BorderedVector* part : {&fresh.change, &fresh.image, &fresh.step}) scale(1 / left, *part);
   directions.push_back(std::move(fresh));
   return true;
 }
