@@ -29,7 +29,8 @@ struct Subspace
 {
   MultiVector V; // orthonormal
   std::array<Mat, 4> matrices{};
-  std::array<double, 4> norms{}; // 1-norms
+  std::array<Owned<Mat>, 4> transposed{}; // once they are asked for
+  std::array<double, 4> norms{};          // 1-norms
   LossyMatrices entries{};
 };
 
@@ -57,7 +58,8 @@ bool extend(Subspace& space, MultiVector X)
     entries.conservativeResize(space.V.columns(), space.V.columns());
     entries.rightCols(W.columns()) = inner_products(space.V, product(space.matrices[k], W));
     if (size == 0) continue;
-    const Owned<Mat> transposed = transpose_of(space.matrices[k]);
+    Owned<Mat>& transposed = space.transposed[k];
+    if (!transposed.get()) transposed = transpose_of(space.matrices[k]);
     entries.bottomLeftCorner(W.columns(), size) = inner_products(product(transposed, W), before);
   }
   return true;
