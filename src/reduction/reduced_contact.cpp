@@ -86,19 +86,26 @@ double largest_defect(const Iterate& iterate)
 bool solve_contact(const ReducedMap& map, const VectorXd& b, ReducedContact& contact)
 {
   if (b.size() == 0) return true;
-  VectorXd& r = contact.r;
-  const VectorXd extrapolated = contact.r_before.size() == 0 ? r : VectorXd(2 * r - contact.r_before);
-  contact.r_before = std::exchange(r, extrapolated);
-  contact.w = b + map.W * r;
-  Iterate iterate{map, r, contact.w, b.cwiseAbs().maxCoeff()};
+  const bool alone = contact.r_before.size() == 0;
+  const auto extrapolate = [alone](VectorXd& now, VectorXd& before)
+  {
+    const VectorXd next = alone ? now : VectorXd(2 * now - before);
+    before = std::exchange(now, next);
+  };
+  extrapolate(contact.r, contact.r_before);
+  extrapolate(contact.Wr, contact.Wr_before);
+  contact.w = b + contact.Wr;
+  Iterate iterate{map, contact.r, contact.w, b.cwiseAbs().maxCoeff()};
   admit(iterate);
   const double tolerance = map.contact.tolerance;
-  for (int sweep = 0; sweep < map.contact.max_iterations; ++sweep)
+  double worst = largest_defect(iterate);
+  for (int sweep = 0; worst > tolerance && sweep < map.contact.max_iterations; ++sweep)
   {
-    if (largest_defect(iterate) <= tolerance) return true;
     sweep_pairs(iterate, 0.01 * tolerance);
+    worst = largest_defect(iterate);
   }
-  return false;
+  contact.Wr = contact.w - b;
+  return worst <= tolerance;
 }
 
 } // namespace squeal

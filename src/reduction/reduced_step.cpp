@@ -83,28 +83,13 @@ void prepare(ReducedMap& map, double period)
 namespace
 {
 
-/// What the pairs see of a step's start.
-struct PairMotion
-{
-  VectorXd free, before, position; // G v_free, G v, G q
-};
-
-PairMotion motion_of_pairs(const ReducedModel& model, const ReducedState& state, const VectorXd& v_free)
-{
-  MatrixXd x(model.size(), 3);
-  x << v_free, state.v, state.q;
-  const MatrixXd y = model.G * x;
-  return {y.col(0), y.col(1), y.col(2)};
-}
-
-/// b of w = W r + b without past sliding: normal rows are gap rates (g0 + G_n q~)/h + G_n v_free, q~ = q + h (1-theta)
-/// v, tangential ones sliding velocities.
-VectorXd free_contact_velocity(const ReducedMap& map, const PairMotion& motion)
+/// b of w = W r + b without past sliding, of b = G v_free: normal rows are gap rates (g0 + G_n q~)/h + G_n v_free, q~ =
+/// q + h (1-theta) v, tangential ones sliding velocities.
+VectorXd free_contact_velocity(const ReducedMap& map, const ReducedContact& contact, VectorXd b)
 {
   const ReducedModel& model = map.model;
-  VectorXd b = motion.free;
   const PairView<double> velocity(b, model.directions);
-  const PairView before(motion.before, model.directions), position(motion.position, model.directions);
+  const PairView before(contact.velocity, model.directions), position(contact.position, model.directions);
   const TangentView drive(model.drive, model.directions);
   for (std::size_t i = 0; i < model.gap.size(); ++i)
   {
@@ -127,16 +112,14 @@ VectorXd contact_velocity(const ReducedModel& model, VectorXd velocity)
 }
 
 /// Solves contact, again as long as a pair is turned by its past sliding. Returns whether it converged.
-bool find_reactions(const ReducedMap& map, const ReducedState& state, const VectorXd& v_free, ReducedContact& contact)
+bool find_reactions(const ReducedMap& map, const VectorXd& Gv_free, ReducedContact& contact)
 {
   const ReducedModel& model = map.model;
-  const PairMotion motion = motion_of_pairs(model, state, v_free);
-  const VectorXd free = free_contact_velocity(map, motion);
-  const VectorXd& velocity = motion.before;
+  const VectorXd free = free_contact_velocity(map, contact, Gv_free);
   const auto reactions = [&] { return PairView<const double>(contact.r, model.directions); };
-  const VectorXd sliding = contact_velocity(model, velocity);
+  const VectorXd sliding = contact_velocity(model, contact.velocity);
   contact.past =
-      past_sliding(PairView(velocity, model.directions), TangentView(model.drive, model.directions),
+      past_sliding(PairView(contact.velocity, model.directions), TangentView(model.drive, model.directions),
                    contact_status(reactions(), PairView<const double>(sliding, model.directions), model.friction),
                    (1 - map.theta) / map.theta);
   const auto b = [&] { return VectorXd(free + VectorXd::Map(contact.past.data(), free.size())); };
@@ -150,18 +133,41 @@ bool find_reactions(const ReducedMap& map, const ReducedState& state, const Vect
   return converged;
 }
 
+/// G v+ of G v_free: W r is at hand, of which a pair's own compliance is no motion.
+VectorXd moved_by_reactions(const ReducedMap& map, const ReducedContact& contact, VectorXd velocity)
+{
+  velocity += contact.Wr;
+  const PairView<double> result(velocity, map.model.directions);
+  const PairView r(contact.r, map.model.directions);
+  for (std::size_t i = 0; i < map.model.gap.size(); ++i) result.normal(i) -= gap_law(map, i).by_reaction * r.normal(i);
+  return velocity;
+}
+
 } // namespace
 
 bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact)
 {
   const Eigen::Index n = map.model.size();
+  const MatrixXd& G = map.model.G;
+  if (contact.Wr.size() == 0)
+  {
+    contact.Wr = map.W * contact.r;
+    contact.position = G * state.q;
+    contact.velocity = G * state.v;
+  }
   VectorXd both(2 * n);
   both << state.v, state.q;
   VectorXd next = map.from_state * both + map.from_load;
-  const bool converged = find_reactions(map, state, next, contact);
+  const VectorXd Gv_free = G * next;
+  const bool converged = find_reactions(map, Gv_free, contact);
   next.noalias() += map.from_reactions * contact.r;
-  state.q += map.h * (map.theta * next + (1 - map.theta) * state.v);
-  state.v = std::move(next);
+  const auto move = [&](VectorXd& position, VectorXd& velocity, VectorXd end)
+  {
+    position += map.h * (map.theta * end + (1 - map.theta) * velocity);
+    velocity = std::move(end);
+  };
+  move(contact.position, contact.velocity, moved_by_reactions(map, contact, Gv_free));
+  move(state.q, state.v, std::move(next));
   return converged;
 }
 

@@ -13,10 +13,12 @@ namespace squeal
 /// The active pairs at the end of a step, and what the next one starts from.
 struct ReducedContact
 {
-  Eigen::VectorXd r;          // [N] a contact vector, as all vectors here
-  Eigen::VectorXd w{};        // [m/s] W r + b
-  Eigen::VectorXd r_before{}; // of the step before; empty: none
-  std::vector<double> past{}; // [m/s] w_t - s+, as sliding_direction.hpp says
+  Eigen::VectorXd r;                       // [N] a contact vector, as all vectors here
+  Eigen::VectorXd w{};                     // [m/s] W r + b
+  Eigen::VectorXd Wr{};                    // [m/s] empty: to be formed, as G q and G v of the state
+  Eigen::VectorXd r_before{}, Wr_before{}; // of the step before; empty: none
+  Eigen::VectorXd position{}, velocity{};  // [m, m/s] G q, G v
+  std::vector<double> past{};              // [m/s] w_t - s+, as sliding_direction.hpp says
 };
 
 /// The period map of the reduced model by theta steps (src/README.md, section 4), with matrices for each step size:
