@@ -27,7 +27,6 @@ struct LinearStep
   LinearContact contact;
   MatrixXd rates;        // b
   MatrixXd by_reactions; // P Q
-  LeadingFactor factor;
 };
 
 /// db of all rows for changes of the start (v, q), without past sliding.
@@ -56,14 +55,17 @@ LinearStep linear_step(const ReducedMap& map, const MatrixXd& rates, const StepR
   const Index n = model.size(), d = model.directions;
   const PairRows<Index> rows(model.directions);
   LinearContact contact(map.W, {model.directions, model.friction, map.theta}, record);
-  if (contact.is_open()) return {std::move(contact), {}, {}, {}};
-  MatrixXd moved = rates;
-  for (std::size_t i = 0; i < record.opposes_theta.size(); ++i)
-    if (const Index first = rows.tangential(static_cast<Index>(i)); record.opposes_theta[i])
-      moved.middleRows(first, d).leftCols(n) += (1 - map.theta) / map.theta * model.G.middleRows(first, d);
-  MatrixXd of_rows = contact.rows_of(moved), by_reactions = contact.columns_of(map.from_reactions);
-  LeadingFactor factor = contact.factor();
-  return {std::move(contact), std::move(of_rows), std::move(by_reactions), std::move(factor)};
+  if (contact.is_open()) return {std::move(contact), {}, {}};
+  MatrixXd of_rows = contact.rows_of(rates), by_reactions = contact.columns_of(map.from_reactions);
+  if (d > 0)
+  {
+    MatrixXd past = MatrixXd::Zero(rates.rows(), n);
+    for (std::size_t i = 0; i < record.opposes_theta.size(); ++i)
+      if (const Index first = rows.tangential(static_cast<Index>(i)); record.opposes_theta[i])
+        past.middleRows(first, d) = (1 - map.theta) / map.theta * model.G.middleRows(first, d);
+    of_rows.leftCols(n) += contact.rows_of(past);
+  }
+  return {std::move(contact), std::move(of_rows), std::move(by_reactions)};
 }
 
 /// Columns of the start, rows (v, q), to those of the step's end.
@@ -71,7 +73,7 @@ void advance_columns(const ReducedMap& map, const LinearStep& step, MatrixXd& X)
 {
   const Index n = map.model.size();
   MatrixXd v = map.from_state * X;
-  if (!step.contact.is_open()) v.noalias() += step.by_reactions * step.contact.solve(step.factor, step.rates * X);
+  if (!step.contact.is_open()) v.noalias() += step.by_reactions * step.contact.solve(step.rates * X);
   X.bottomRows(n) += map.h * (map.theta * v + (1 - map.theta) * X.topRows(n));
   X.topRows(n) = v;
 }
@@ -85,8 +87,7 @@ void go_back(const ReducedMap& map, const LinearStep& step, MatrixXd& X)
   start.topRows(n) += map.h * (1 - map.theta) * X.bottomRows(n);
   start.bottomRows(n) += X.bottomRows(n);
   if (!step.contact.is_open())
-    start.noalias() +=
-        step.rates.transpose() * step.contact.solve_transposed(step.factor, step.by_reactions.transpose() * v);
+    start.noalias() += step.rates.transpose() * step.contact.solve_transposed(step.by_reactions.transpose() * v);
   X = std::move(start);
 }
 

@@ -11,25 +11,20 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-namespace
+MatrixXd LinearContact::solve_leading(const MatrixXd& right) const
 {
-
-MatrixXd solve_with(const LeadingFactor& factor, const MatrixXd& right)
-{
-  MatrixXd x = Eigen::PermutationMatrix<Eigen::Dynamic>(factor.order) * right;
-  factor.LU.triangularView<Eigen::UnitLower>().solveInPlace(x);
-  factor.LU.triangularView<Eigen::Upper>().solveInPlace(x);
+  MatrixXd x = Eigen::PermutationMatrix<Eigen::Dynamic>(order_) * right;
+  leading_block().triangularView<Eigen::UnitLower>().solveInPlace(x);
+  leading_block().triangularView<Eigen::Upper>().solveInPlace(x);
   return x;
 }
 
-MatrixXd solve_transposed_with(const LeadingFactor& factor, MatrixXd x)
+MatrixXd LinearContact::solve_leading_transposed(MatrixXd x) const
 {
-  factor.LU.triangularView<Eigen::Upper>().transpose().solveInPlace(x);
-  factor.LU.triangularView<Eigen::UnitLower>().transpose().solveInPlace(x);
-  return Eigen::PermutationMatrix<Eigen::Dynamic>(factor.order).transpose() * x;
+  leading_block().transpose().triangularView<Eigen::Lower>().solveInPlace(x);
+  leading_block().transpose().triangularView<Eigen::UnitUpper>().solveInPlace(x);
+  return Eigen::PermutationMatrix<Eigen::Dynamic>(order_).transpose() * x;
 }
-
-} // namespace
 
 void LinearContact::set_unknowns(const ContactLaw& law, const StepRecord& record)
 {
@@ -79,6 +74,11 @@ LinearContact::LinearContact(const Eigen::Ref<const MatrixXd>& W, const ContactL
   for (Index i = 0; i < leading; ++i) A_(i, i) = A_.row(i).isZero(0) ? 1 : A_(i, i) * (1 + more);
   for (Index i = leading; i < A_.rows(); ++i) A_.row(i) *= S_(i - leading);
   A_.diagonal().tail(S_.size()).array() += 1;
+  order_ = Eigen::VectorXi::LinSpaced(leading, 0, to_int(leading) - 1);
+  Eigen::Ref<MatrixXd> block = A_.topLeftCorner(leading, leading);
+  if (leading == 0 || !block.allFinite()) return; // LAPACK would leave the order unset
+  const Eigen::PartialPivLU<Eigen::Ref<MatrixXd>> in_place(block);
+  order_ = in_place.permutationP().indices();
 }
 
 /// Shows each column of F Q to visit(place, column).
@@ -118,17 +118,6 @@ void LinearContact::put_rows(const double* column, double* result) const
     }
 }
 
-LeadingFactor LinearContact::factor() const
-{
-  const auto leading = static_cast<Index>(leading_.size());
-  LeadingFactor result{A_.topLeftCorner(leading, leading), {}};
-  result.order = Eigen::VectorXi::LinSpaced(leading, 0, to_int(leading) - 1);
-  if (leading == 0 || !result.LU.allFinite()) return result; // LAPACK would leave the order unset
-  const Eigen::PartialPivLU<Eigen::Ref<MatrixXd>> in_place(result.LU);
-  result.order = in_place.permutationP().indices();
-  return result;
-}
-
 MatrixXd LinearContact::rows_of(const MatrixXd& db) const
 {
   MatrixXd result(A_.rows(), db.cols());
@@ -143,9 +132,10 @@ MatrixXd LinearContact::columns_of(const Eigen::Ref<const MatrixXd>& F) const
   return result;
 }
 
-/// A^-1 of the right side, by the leading block and the rest in turn.
+/// A^-1 of the right side, by the leading block and the rest in turn; by block elimination where that does not
+/// converge.
 template <class Matrix, class Solve>
-MatrixXd LinearContact::solve_by_parts(const Matrix& A, const Solve& solve_leading, const MatrixXd& right) const
+MatrixXd LinearContact::solve_by_parts(const Matrix& A, const Solve& solve_first, const MatrixXd& right) const
 {
   const Index turned = S_.size(), leading = A.rows() - turned;
   const VectorXd own = A.diagonal().tail(turned);
@@ -155,7 +145,7 @@ MatrixXd LinearContact::solve_by_parts(const Matrix& A, const Solve& solve_leadi
   {
     MatrixXd of_leading = right.topRows(leading);
     if (pass > 0) of_leading.noalias() -= A.topRightCorner(leading, turned) * x.bottomRows(turned);
-    x.topRows(leading) = solve_leading(of_leading);
+    x.topRows(leading) = solve_first(of_leading);
     if (turned == 0) return x;
     MatrixXd missed = right.bottomRows(turned);
     missed.noalias() -= A.bottomRows(turned) * x;
@@ -166,21 +156,27 @@ MatrixXd LinearContact::solve_by_parts(const Matrix& A, const Solve& solve_leadi
     if (pass > 2 && !(change <= 0.5 * last)) break;
     last = change;
   }
-  return MatrixXd(A).partialPivLu().solve(right);
+  const MatrixXd by_turned = solve_first(A.topRightCorner(leading, turned));
+  const MatrixXd of_first = solve_first(right.topRows(leading)),
+                 schur = A.bottomRightCorner(turned, turned) - A.bottomLeftCorner(turned, leading) * by_turned;
+  x.bottomRows(turned) =
+      schur.partialPivLu().solve(right.bottomRows(turned) - A.bottomLeftCorner(turned, leading) * of_first);
+  x.topRows(leading) = of_first - by_turned * x.bottomRows(turned);
+  return x;
 }
 
-MatrixXd LinearContact::solve(const LeadingFactor& factor, MatrixXd right) const
+MatrixXd LinearContact::solve(MatrixXd right) const
 {
   right = -right;
   right.bottomRows(S_.size()) = (S_.asDiagonal() * right.bottomRows(S_.size())).eval();
   return solve_by_parts(
-      A_, [&](const MatrixXd& b) { return solve_with(factor, b); }, right);
+      A_, [&](const MatrixXd& b) { return solve_leading(b); }, right);
 }
 
-MatrixXd LinearContact::solve_transposed(const LeadingFactor& factor, const MatrixXd& right) const
+MatrixXd LinearContact::solve_transposed(const MatrixXd& right) const
 {
   MatrixXd result = -solve_by_parts(
-      A_.transpose(), [&](const MatrixXd& b) { return solve_transposed_with(factor, b); }, right);
+      A_.transpose(), [&](const MatrixXd& b) { return solve_leading_transposed(b); }, right);
   result.bottomRows(S_.size()) = (S_.asDiagonal() * result.bottomRows(S_.size())).eval();
   return result;
 }

@@ -120,17 +120,18 @@ struct RecordedStep
   const Interface& interface;
   const StepRecord& record;
   std::span<const double> W; // all entries, on rank 0
-  double& room;              // [byte] for factors that are kept, on rank 0
+  double& room;              // [byte] for what is kept of contact, on rank 0
 };
 
-/// The record's own factor, else one that is kept there as long as there is room.
-const LeadingFactor& factor_of(const LinearContact& contact, const StepRecord& record, double& room,
-                               LeadingFactor& fresh)
+/// The step's contact: the record's own, else a new one, which is kept there as long as there is room.
+std::shared_ptr<const LinearContact> contact_of_step(const RecordedStep& of, const Eigen::Map<const MatrixXd>& W)
 {
-  if (record.factor.order.size() > 0) return record.factor;
-  fresh = contact.factor();
-  room -= sizeof(double) * static_cast<double>(fresh.LU.size());
-  return room > 0 ? record.factor = std::move(fresh) : fresh;
+  if (of.record.linear) return of.record.linear;
+  auto contact = std::make_shared<const LinearContact>(
+      W, ContactLaw{of.interface.directions, of.interface.friction, of.step.theta}, of.record);
+  of.room -= contact->memory();
+  if (of.room > 0) of.record.linear = contact;
+  return contact;
 }
 
 /// dr of every column, on every rank. `Bv_free`: B dv_f of each, on rank 0.
@@ -142,16 +143,14 @@ MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> column
   const auto find = [&]
   {
     const Eigen::Map<const MatrixXd> W(entries.data(), db.rows(), db.rows());
-    const LinearContact contact(W, {interface.directions, interface.friction, step.theta}, record);
-    if (contact.is_open()) return;
+    const auto contact = contact_of_step(of, W);
+    if (contact->is_open()) return;
     db += MatrixXd::Map(Bv_free.data(), db.rows(), db.cols());
     Eigen::RowVectorXd dmu(db.cols());
     for (Index k = 0; k < dmu.size(); ++k) dmu(k) = columns[static_cast<std::size_t>(k)].friction;
-    const VectorXd& of_coefficient = contact.by_coefficient();
+    const VectorXd& of_coefficient = contact->by_coefficient();
     if (!dmu.isZero(0)) db += W * of_coefficient * dmu;
-    LeadingFactor fresh;
-    const LeadingFactor& factor = factor_of(contact, record, room, fresh);
-    dr = contact.reactions(contact.solve(factor, contact.rows_of(db))) + of_coefficient * dmu;
+    dr = contact->reactions(contact->solve(contact->rows_of(db))) + of_coefficient * dmu;
   };
   on_rank_zero(comm_of(interface.B), find);
   MPI_Bcast(dr.data(), to_int(dr.size()), MPI_DOUBLE, 0, comm_of(interface.B));

@@ -9,7 +9,7 @@
 /// speed. With dr = Q x of the unknowns x, and P the rows of dw that they answer to, W whatever it is:
 ///     A x = -P db,   A = P W Q with rows of y times S, and 1 more on their diagonal.
 /// The leading block is factored. Without y, as with one tangential direction and constant mu, that is exact. Else a
-/// fixed point finds y, which contracts fast where w_t is large beside its changes. Where it does not, A is factored.
+/// fixed point finds y, which contracts fast where w_t is large beside its changes. Where it does not, y is eliminated.
 #include "squeal/contact/solver.hpp"
 #include "squeal/transient/step_record.hpp"
 
@@ -32,16 +32,16 @@ public:
 
   bool is_open() const { return leading_.empty(); } // all pairs
 
-  /// The factor of the leading block.
-  LeadingFactor factor() const;
+  /// Memory that it takes [byte].
+  double memory() const { return sizeof(double) * static_cast<double>(A_.size()); }
 
   /// P db of each column.
   Eigen::MatrixXd rows_of(const Eigen::MatrixXd& db) const;
   /// F Q
   Eigen::MatrixXd columns_of(const Eigen::Ref<const Eigen::MatrixXd>& F) const;
   /// x of P db, and its transpose.
-  Eigen::MatrixXd solve(const LeadingFactor& factor, Eigen::MatrixXd right) const;
-  Eigen::MatrixXd solve_transposed(const LeadingFactor& factor, const Eigen::MatrixXd& right) const;
+  Eigen::MatrixXd solve(Eigen::MatrixXd right) const;
+  Eigen::MatrixXd solve_transposed(const Eigen::MatrixXd& right) const;
   /// dr = Q x
   Eigen::MatrixXd reactions(const Eigen::MatrixXd& x) const;
 
@@ -62,14 +62,18 @@ private:
   void put_rows(const double* column, double* result) const;
   template <class Visit> void for_each_column(const Eigen::Ref<const Eigen::MatrixXd>& F, Visit visit) const;
   template <class Matrix, class Solve>
-  Eigen::MatrixXd solve_by_parts(const Matrix& A, const Solve& solve_leading, const Eigen::MatrixXd& right) const;
+  Eigen::MatrixXd solve_by_parts(const Matrix& A, const Solve& solve_first, const Eigen::MatrixXd& right) const;
+  auto leading_block() const { return A_.topLeftCorner(order_.size(), order_.size()); }
+  Eigen::MatrixXd solve_leading(const Eigen::MatrixXd& right) const;
+  Eigen::MatrixXd solve_leading_transposed(Eigen::MatrixXd x) const;
 
   std::vector<Eigen::Index> leading_; // rows of W
   std::vector<Slip> slips_;
   Eigen::Index first_turned_ = 0; // of the directions of `turn`: the first one that has an entry of y
   Eigen::VectorXd S_;             // [N s/m] the diagonal of S, by entries of y: pair by pair
   Eigen::VectorXd by_coefficient_;
-  Eigen::MatrixXd A_;
+  Eigen::MatrixXd A_;     // its leading block as L U
+  Eigen::VectorXi order_; // P of P A = L U of that block
 };
 
 } // namespace squeal

@@ -2,7 +2,7 @@
 /// What the tangent of a step needs to know of it (src/README.md, section 4.13). `advance` fills it where one is given.
 #include "squeal/base/petsc.hpp"
 
-#include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 namespace squeal
@@ -15,12 +15,7 @@ enum class Recorded
   contact_and_rates, // the column of h needs the rates
 };
 
-/// P A = L U of a step's contact (linear_contact.hpp).
-struct LeadingFactor
-{
-  Eigen::MatrixXd LU{};
-  Eigen::VectorXi order{}; // P; empty: there is no factor
-};
+class LinearContact;
 
 /// The record of one step; that of a reduced model has the contact of its active pairs alone.
 struct StepRecord
@@ -37,7 +32,7 @@ struct StepRecord
   Owned<Vec> v_theta;      // [m/s]
   std::vector<double> gap; // [m] g0 + B_n u of each pair, on every rank
 
-  mutable LeadingFactor factor{}; // kept by rank 0 for the columns to come, where there is room
+  mutable std::shared_ptr<const LinearContact> linear{}; // kept by rank 0 for the columns to come, where there is room
 };
 
 } // namespace squeal
