@@ -145,27 +145,6 @@ RealModes search_below(Mat M, Mat K, double limit, const PencilOptions& options)
   }
 }
 
-/// The first `count` modes, below a limit that the nearest theta to the end of the spectrum give.
-RealModes search_first(Mat M, Mat K, PetscInt count, const PencilOptions& options)
-{
-  constexpr double rough = 1e-4; // of theta
-  const double shift = shift_below_zero(M, K);
-  std::vector<double> theta;
-  {
-    ShiftInvert pencil = make_shift_invert(K, M, Keep::factor, options);
-    move_to(pencil, shift);
-    theta = solve_nearest(pencil, count, 0, rough).theta;
-  }
-  std::sort(theta.begin(), theta.end());
-  const auto wanted = static_cast<std::size_t>(count);
-  if (theta.size() < wanted)
-    return {{OutcomeKind::not_converged, format("%zu of %zu real modes found", theta.size(), wanted), 0, 0}, {}, {}};
-  const double last = theta[wanted - 1];
-  RealModes modes = search_below(M, K, last + 10 * rough * (last - shift), options);
-  keep_first(modes, std::min<std::ptrdiff_t>(count, std::ssize(modes.omega)));
-  return modes;
-}
-
 void to_structure(RealModes& modes, Mat Z)
 {
   for (Owned<Vec>& shape : modes.shapes)
@@ -189,15 +168,6 @@ Inertia inertia_at(double limit, Mat M, Mat K, const PencilOptions& options, con
   ShiftInvert pencil = make_shift_invert(K, M, Keep::count, options, &order);
   move_to(pencil, limit);
   return {pencil.shift, pencil.factor->negative_pivots()};
-}
-
-RealModes solve_real_modes(Mat M, Mat K, PetscInt count, const ModesOptions& options)
-{
-  PetscInt n = 0;
-  check(MatGetSize(K, &n, nullptr));
-  if (count <= 0) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
-  if (n <= options.dense_limit) return first_of(solve_whole(M, K), K, count);
-  return search_first(M, K, std::min(count, n), options.pencil);
 }
 
 RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options)

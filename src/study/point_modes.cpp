@@ -24,6 +24,7 @@ using Eigen::VectorXd;
 
 constexpr Index sketched_sides = 32; // random vectors: their mean square is off by 25 % (one standard deviation)
 constexpr double basis_band = 1.1;   // of the real modes, over the band
+constexpr double widest_band = 64;   // the same, as long as there are fewer than
 constexpr std::size_t fewest = 20;   // real modes
 constexpr double waiting_share =
     0.02;                       // directions of corrections below this part of the largest wait for the next pass
@@ -285,8 +286,9 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   check(MatNorm(modes.M_z, NORM_1, &modes.norms.M));
   check(MatNorm(C_z, NORM_1, &modes.norms.C));
   check(MatNorm(modes.K_z, NORM_1, &modes.norms.K));
-  RealModes real = solve_real_modes_below(modes.M_z, modes.K_z, basis_band * problem.band, problem.options);
-  if (real.omega.size() < fewest) real = solve_real_modes(modes.M_z, modes.K_z, fewest, problem.options);
+  RealModes real;
+  for (double part = basis_band; real.omega.size() < fewest && part < widest_band; part *= 2)
+    real = solve_real_modes_below(modes.M_z, modes.K_z, part * problem.band, problem.options);
   MultiVector shapes = empty_multivector(modes.K_z);
   for (const Owned<Vec>& shape : real.shapes) append(shapes, shape);
   extend(modes.basis, product(modes.contact.Z, shapes));

@@ -24,9 +24,6 @@ struct Inertia
 /// The count below a limit by a factor that is not kept.
 Inertia inertia_at(double limit, Mat M, Mat K, const PencilOptions& options, const EliminationOrder& order);
 
-/// The lowest `count` modes, or all if there are fewer. Shapes are x, in the rows of K.
-RealModes solve_real_modes(Mat M, Mat K, PetscInt count, const ModesOptions& options);
-
 /// All modes with frequency below `band` [Hz]. Shapes are x, in the rows of K.
 RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options);
 
