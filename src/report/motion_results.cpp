@@ -254,9 +254,10 @@ void add_cycle(Entry out, const Report& report)
   const bool is_found = cycle.outcome.kind == OutcomeKind::converged;
   add_figures(is_found ? out : out.hidden(), cycle, bias);
   out.add("mode", "-", "place of the followed mode in `modes.modes`, from 0", report.motion.followed.index);
-  std::optional<bool> closes = cycle.tolerance > 0 ? cycle.orbit.residual <= cycle.tolerance : is_found;
-  if (cycle.outcome.kind == OutcomeKind::settled) closes.reset(); // another motion is the answer
-  out.check(closes, "residual_full", "-", "distance of end and start over that from equilibrium", cycle.orbit.residual);
+  const bool is_answer = cycle.outcome.kind != OutcomeKind::settled, // where another motion is, nothing rests on it
+      closes = cycle.tolerance > 0 ? cycle.orbit.residual <= cycle.tolerance : is_found;
+  out.check(is_answer ? std::optional(closes) : std::nullopt, "residual_full", "-",
+            "distance of end and start over that from equilibrium", cycle.orbit.residual);
   out.show("tolerance", "-", "largest residual of a cycle; 0: `accuracy` decided instead", cycle.tolerance);
   out.add("residual_projected", "-", "residual on the subspace; `null`: not tried",
           cycle.convergence.residual_projected);

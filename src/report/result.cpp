@@ -130,9 +130,10 @@ std::string csv_of(const Result& list)
     for (const Result& part : group.parts)
       if (!part.value.is_array() && std::ranges::find(names, part.name) == names.end()) names.push_back(part.name);
   std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ",") + csv_text(name);
+  for (const std::string& name : names) text.append(text.empty() ? "" : ",").append(csv_text(name));
   for (const Result& group : list.parts)
-    for (std::size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "\n" : ",") + csv_cell(group.part(names[i]));
+    for (std::size_t i = 0; i < names.size(); ++i)
+      text.append(i == 0 ? "\n" : ",").append(csv_cell(group.part(names[i])));
   return text + "\n";
 }
 
