@@ -113,7 +113,8 @@ void refuse_undriven_pairs(const Scene& scene, const Interface& interface)
   };
   refuse(scene.sweep && scene.sweep->stages != SweepStages::equilibrium, "[sweep] of modes",
          "set sweep.stages = \"equilibrium\"");
-  refuse(scene.sensitivity.has_value(), "[sensitivity]", "take it out");
+  refuse(scene.sensitivity && !scene.friction.slipped_pairs_stick, "[sensitivity] of pairs that slide",
+         "leave friction.slipped_pairs_stick out");
   refuse(scene.robustness.has_value(), "[robustness]", "take it out");
 }
 

@@ -89,13 +89,18 @@ PairMotions pair_motions(const Interface& interface, const MultiVector& x)
   const TangentView e(directions, interface.directions);
   const Eigen::VectorXcd motion = pair_rows(interface, x);
   const PairRows<Index> rows(interface.directions);
-  PairMotions result{{}, std::vector<Complex>(mu.size())};
+  PairMotions result{{}, std::vector<Complex>(mu.size()), std::vector<std::array<Complex, 2>>(mu.size())};
   for (std::size_t i = 0; i < mu.size(); ++i)
   {
     const auto pair = static_cast<Index>(i);
+    const double of_slip = slip_compliance_of(interface, i);
     result.normal.push_back(motion(rows.normal(pair)));
     for (Index k = 0; k < interface.directions; ++k)
-      result.friction[i] += mu[i] * e.of(i)[static_cast<std::size_t>(k)] * motion(rows.tangential(pair) + k);
+    {
+      const Complex slip = motion(rows.tangential(pair) + k);
+      result.friction[i] += mu[i] * e.of(i)[static_cast<std::size_t>(k)] * slip;
+      if (of_slip > 0) result.elastic[i][static_cast<std::size_t>(k)] = slip / std::sqrt(of_slip);
+    }
   }
   return result;
 }
@@ -116,8 +121,12 @@ std::vector<Complex> residuals_at(const SlidingEquilibrium& sliding, const std::
     const PairMotions of_left = pair_motions(interface, mode.left), of_right = pair_motions(interface, mode.right);
     Complex residual = bilinear(mode.left, weighted_sum(matrices, factors_of(mode.lambda, structure), mode.right));
     for (std::size_t i = 0; i < mode.sides.size(); ++i)
+    {
       residual += mode.sides[i] * (of_right.normal[i] + compliance_of(interface, i) * mode.reactions[i]) -
                   mode.reactions[i] * (of_left.normal[i] + of_left.friction[i]);
+      for (std::size_t k = 0; equilibrium.closed[i] && k < 2; ++k)
+        residual += of_left.elastic[i][k] * of_right.elastic[i][k];
+    }
     residuals.push_back(residual);
   }
   return residuals;

@@ -9,7 +9,8 @@ namespace squeal
 
 /// A mode with vectors in the structure's degrees of freedom, by their real and imaginary parts. They solve
 ///     Q right = R' reactions,   B_n right + c reactions = 0,   Q'left + B_n' sides = 0,   R left = c sides
-/// on the closed pairs, R = B_n + mu e.B_t, c their compliance. The right one is the scene's mode, and
+/// on the closed pairs, R = B_n + mu e.B_t, c their compliance. Pairs that stick have B_t right = B_t left = 0, or with
+/// elastic slip c_t springs B_t'B_t/c_t in Q. The right one is the scene's mode, and
 /// left'Q'(lambda) right = 1.
 struct HeldMode
 {
@@ -21,10 +22,11 @@ struct HeldMode
 /// B x on the rows of the pairs, of real and imaginary parts.
 Eigen::VectorXcd pair_rows(const Interface& interface, const MultiVector& x);
 
-/// B_n x and mu e.B_t x of every pair: their sum is R x.
+/// B_n x and mu e.B_t x of every pair, whose sum is R x, and B_t x over the root of c_t, 0 without elastic slip.
 struct PairMotions
 {
   std::vector<std::complex<double>> normal, friction;
+  std::vector<std::array<std::complex<double>, 2>> elastic;
 };
 
 PairMotions pair_motions(const Interface& interface, const MultiVector& x);

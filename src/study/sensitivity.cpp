@@ -68,14 +68,16 @@ Energies energies_of(const SlidingEquilibrium& sliding, const MultiVector& phi)
 {
   const auto& [structure, interface, equilibrium] = sliding;
   Energies energies{quadratic_form(structure.M, phi), quadratic_form(structure.K, phi)};
-  const std::vector<Complex> normal = pair_motions(interface, phi).normal;
-  for (std::size_t i = 0; i < normal.size(); ++i)
-    if (const double compliance = compliance_of(interface, i); compliance > 0 && equilibrium.closed[i])
-    {
-      const double spring = std::norm(normal[i]) / compliance;
-      energies.stiffness += spring;
-      add(energies.of_contacts, interface.friction.contact_of(i), spring);
-    }
+  const PairMotions motions = pair_motions(interface, phi);
+  for (std::size_t i = 0; i < motions.normal.size(); ++i)
+  {
+    if (!equilibrium.closed[i]) continue;
+    const double compliance = compliance_of(interface, i),
+                 springs = (compliance > 0 ? std::norm(motions.normal[i]) / compliance : 0) +
+                           std::norm(motions.elastic[i][0]) + std::norm(motions.elastic[i][1]);
+    energies.stiffness += springs;
+    add(energies.of_contacts, interface.friction.contact_of(i), springs);
+  }
   return energies;
 }
 
@@ -140,11 +142,15 @@ void find_shares(const SensitivityProblem& problem, const std::vector<HeldMode>&
 }
 
 /// Whether two interfaces of one B put the same conditions on an equilibrium: friction by its value at each drive
-/// speed, whichever number of the law gives it.
+/// speed, whichever number of the law gives it, or at rest where there is no drive.
 bool same_contact(const Interface& a, const Interface& b)
 {
-  return a.gap == b.gap && a.compliance == b.compliance && drive_friction(a) == drive_friction(b) &&
-         drive_directions(a) == drive_directions(b);
+  const auto at_rest = [](const Interface& interface, std::size_t i)
+  { return is_undriven(interface, i) ? friction_coefficient(interface.friction.of(i), 0).value : 0; };
+  for (std::size_t i = 0; i < a.gap.size(); ++i)
+    if (at_rest(a, i) != at_rest(b, i)) return false;
+  return a.gap == b.gap && a.compliance == b.compliance && a.slip_compliance == b.slip_compliance &&
+         drive_friction(a) == drive_friction(b) && drive_directions(a) == drive_directions(b);
 }
 
 /// Derivatives by numbers, of all modes at once.
@@ -184,7 +190,8 @@ public:
 private:
   using Residuals = std::vector<Complex>;
 
-  /// The residuals of the held vectors at another value; nothing where other pairs are closed, or that is no scene.
+  /// The residuals of the held vectors at another value; nothing where other pairs are closed, or that is no scene, or
+  /// pairs that stick face another way: the residual does not hold their friction.
   std::optional<Residuals> beside(const SceneNumber& number, double step)
   try
   {
@@ -192,6 +199,9 @@ private:
     const auto& [structure, interface, own] = problem_.sliding;
     const bool same = model.structure.K.get() == structure.K && model.interface.B.get() == interface.B &&
                       model.structure.load.get() == structure.load && same_contact(model.interface, interface);
+    PetscBool same_rows = PETSC_TRUE;
+    if (has_undriven_pairs(interface)) check(MatEqual(model.interface.B, interface.B, &same_rows));
+    if (!same_rows) return std::nullopt;
     std::optional<Equilibrium> other;
     if (interface.pairs > 0 && !same) other = equilibria_.at(model.structure, model.interface);
     const Equilibrium& equilibrium = other ? *other : own;
