@@ -25,6 +25,7 @@ SIZED = {
     "falling friction": ["friction.coefficient", "friction.static_coefficient", "friction.decay_speed", "contact.0.velocity.1",
                          "contact.1.velocity.0", "force.0.vector.2"],
     "compliant pads": ["friction.coefficient", "contact.0.compliance", "spring.3.stiffness", "force.0.vector.2"],
+    "pads in abutments": ["friction.coefficient", "contact.2.friction", "contact.3.slip_compliance", "spring.3.stiffness", "force.0.vector.2"],
     "lossy pin": ["part.pin.loss_factor", "part.pin.young"],
     "spinning disc": ["part.disc.rotation.rate"],
 }
@@ -38,7 +39,12 @@ ZEROS = [
 ]
 
 
-def two_pads(folder, compliance=0, **friction):
+# The first one slips at its equilibrium, the other sticks with an elastic slip.
+ABUTMENTS = [{"rotor": "caliper", "stator": "top", "normal": [0, -1, 0], "friction": 0.3},
+             {"rotor": "caliper", "stator": "bottom", "normal": [0, -1, 0], "friction": 0.9, "slip_compliance": 2e-7}]
+
+
+def two_pads(folder, compliance=0, abutments=(), **friction):
     """A disc between two pads of a caliper, all of them points: two contacts of different drive, two tangents each."""
     ground = [("disc", "z", 1.2e7, 15), ("disc", "x", 9e8, 50), ("disc", "y", 6e8, 50), ("top", "y", 1e7, 8),
               ("top", "x", 1.3e7, 8), ("top", [0.05, 1, -1], 4e6, 9), ("bottom", "y", 2.3e7, 5), ("bottom", "x", 1.7e7, 5),
@@ -51,7 +57,7 @@ def two_pads(folder, compliance=0, **friction):
                        spring=springs, force=[{"on": "caliper", "vector": [20, 0, -900]}, {"on": "bottom", "vector": [0, 15, 850]}],
                        contact=[{"rotor": "disc", "stator": "top", "normal": [0, 0, 1], "velocity": [0.3, 2, 0],
                                  "compliance": compliance},
-                                {"rotor": "disc", "stator": "bottom", "normal": [0, 0, -1], "velocity": [-0.5, 1.7, 0]}],
+                                {"rotor": "disc", "stator": "bottom", "normal": [0, 0, -1], "velocity": [-0.5, 1.7, 0]}, *abutments],
                        friction={"coefficient": 0.5, **friction}, modes={"band": 5000})
 
 
@@ -80,6 +86,7 @@ def explained(tmp_path_factory):
         if name not in found:
             folder = tmp_path_factory.mktemp("scene")
             arguments = {"compliant pads": lambda: [two_pads(folder, compliance=2e-9)],
+                         "pads in abutments": lambda: [two_pads(folder, abutments=ABUTMENTS)],
                          "falling friction": lambda: [two_pads(folder, static_coefficient=0.6, decay_speed=1.5)],
                          }.get(name, lambda: SCENES[name])()
             keys = SIZED.get(name, ["friction.coefficient"]) + [key for scene, key, *_ in ZEROS if scene == name]
@@ -145,7 +152,7 @@ def power_defect(mode):
     return (sum(sum(mode[key]) for key in FEEDS) - mode["damping_power"] - 2 * mode["growth_rate"]) / (2 * np.pi * mode["frequency_hz"])
 
 
-@pytest.mark.parametrize("scene", ["compliant pads", "lossy pin", "spinning disc", "falling friction"])
+@pytest.mark.parametrize("scene", ["compliant pads", "pads in abutments", "lossy pin", "spinning disc", "falling friction"])
 def test_powers_sum_beyond_rigid_pairs_and_symmetric_matrices(scene, explained):
     for mode in explained(scene)[1].report["sensitivity"]["modes"]:
         assert abs(power_defect(mode)) <= 1e-10
@@ -187,6 +194,7 @@ def test_powers_sum_to_twice_the_growth_rate(explained):
     ("pin", {"part disc", "part pin", "rigid_body holder", "spring holder to ground"}),
     ("heavy holder", {"part disc", "part pin", "rigid_body holder", "spring holder to ground"}),
     ("compliant pads", {"point disc", "point top", "point bottom", "point caliper", "contact top on disc", "spring top to caliper"}),
+    ("pads in abutments", {"contact bottom on caliper", "spring top to caliper"}),
     ("lossy pin", {"part disc", "part pin"}),
     ("spinning disc", {"part disc", "part pin"}),
 ])

@@ -125,7 +125,6 @@ def test_what_does_not_know_such_contacts_says_so(scene, squeal, tmp_path):
         "is the last one": step("press", load=0.5),
         "holds 2 factors": step("press", forces=[1, 1]),
         "moves nothing": '[transient]\n[[initial]]\non = "pad"\n',
-        "[sensitivity] does not know": "[sensitivity]\n",
     }
     runs = {words: scene(more=more).read_text() for words, more in wrong.items()}
     runs |= {words: scene(joint=joint).read_text() for words, joint in {
@@ -133,6 +132,8 @@ def test_what_does_not_know_such_contacts_says_so(scene, squeal, tmp_path):
         "does not change with the speed": "friction = 0.3\nslip_compliance = 1e-9\nfactor_at_speed = [[0, 2], [1, 1]]",
         "one with a rotation or velocity slides": "velocity = [0, 0, 1]\nslip_compliance = 1e-9",
     }.items()}
+    runs["[sensitivity] of pairs that slide does not know"] = scene(
+        more="[sensitivity]\n", friction="slipped_pairs_stick = false\n").read_text()
     for words, text in runs.items():
         (tmp_path / "wrong.toml").write_text(text)
         run = squeal(tmp_path / "wrong.toml", ranks=1)
