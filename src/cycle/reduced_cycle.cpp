@@ -20,6 +20,7 @@ namespace
 constexpr double margin = 1.5;          // pairs that part at this many times the motion's amplitude keep their contact
 constexpr double new_attachment = 1e-5; // an attachment shape is dropped when less than this part of it is new
 constexpr int most_free_periods = 100;  // until the reduced model's motion is periodic
+constexpr double runaway = 1e3;         // times the energy a period before: contact that was not solved feeds it
 
 /// Twice the fluctuating energy.
 double doubled_energy(const ReducedModel& model, const ReducedState& state)
@@ -144,7 +145,9 @@ void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
   while (!periodic() && fidelity.reduced_periods < most_free_periods)
   {
     end_if_asked(map.comm);
+    const double before = doubled_energy(search.model, motion.state) / 2;
     missed = run_one_period(map, motion, correction);
+    if (motion.energy > runaway * before) motion.energy = HUGE_VAL;
     ++fidelity.reduced_periods;
     progress.update(
         static_cast<double>(fidelity.reduced_periods),
