@@ -135,7 +135,7 @@ MeshError skipped(const std::string& reason)
 std::vector<FinerMode> find_finer(std::span<const ComplexMode* const> modes, const Prolongation& prolong,
                                   const SlidingEquilibrium& sliding, const PencilOptions& options)
 {
-  constexpr double beside = 1e-4, lowest = 0.7, highest = 1.4; // of the frequency
+  constexpr double beside = 1e-4, lowest = 0.5, highest = 1.4; // of the frequency
   constexpr int passes = 30;
   constexpr std::size_t pairs = 6; // whichever of them friction mixes
   const LinearisedSliding linearised = linearise(sliding);
@@ -150,12 +150,14 @@ std::vector<FinerMode> find_finer(std::span<const ComplexMode* const> modes, con
     const MultiVector start = kept_rows(columns_of(parts), linearised.contact);
     const double square = std::norm(modes[k]->lambda);
     move_to(pencil, (1 + beside) * square);
-    const QuadraticSolution found = solve_on_subspace(problem, K_loss, start, pencil.factor.get(),
-                                                      {.window = {lowest * lowest * square, highest * highest * square},
-                                                       .passes = passes,
-                                                       .pairs = pairs,
-                                                       .tolerance = 1e-12,
-                                                       .sharp = 1e-13});
+    // a step of inverse iteration: a prolongation is stiff where the coarse elements were not
+    const QuadraticSolution found =
+        solve_on_subspace(problem, K_loss, pencil.factor->solve(product(linearised.M_z, start)), pencil.factor.get(),
+                          {.window = {lowest * lowest * square, highest * highest * square},
+                           .passes = passes,
+                           .pairs = pairs,
+                           .tolerance = 1e-12,
+                           .sharp = 1e-13});
     double best = 0;
     for (const Eigenpair& pair : found.pairs)
     {

@@ -9,14 +9,20 @@ import pytest
 from conftest import INPUTS, ROOT
 
 
-def orders(folder, scene, key, values, *arguments):
-    """Order and limit of each result."""
+def printed(folder, scene, key, values, *arguments):
+    """What the tool prints."""
     command = [sys.executable, ROOT / "tools" / "convergence", INPUTS / scene / "scene.toml", key, *map(str, values),
                "--output", folder, "--", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=os.environ)
     assert done.returncode == 0, done.stderr
     assert (folder / "convergence.png").stat().st_size > 10000
-    rows = re.findall(r"^\| ([^|]+?) \|.*\| (\S+) \| (\S+) \| [^|]+ \|$", done.stdout, re.M)
+    return done.stdout
+
+
+def orders(folder, scene, key, values, *arguments):
+    """Order and limit of each result."""
+    text = printed(folder, scene, key, values, *arguments)
+    rows = re.findall(r"^\| ([^|]+?) \|.*\| (\S+) \| (\S+) \| [^|]+ \| \S+ \+- \S+ \|$", text, re.M)
     return {name: (float(order), float(limit)) for name, order, limit in rows if order not in ("order", "none", "---")}
 
 
@@ -28,6 +34,14 @@ def test_the_period_converges_with_the_square_of_the_step(tmp_path):
     order, limit = found["cycle period [s]"]
     assert order == pytest.approx(2, abs=0.1)
     assert limit == pytest.approx(5.954461004653, rel=1e-5)
+
+
+def test_two_values_have_a_bar(tmp_path):
+    """It holds the exact period, between the orders 1 and infinity, and is no wider than the change."""
+    text = printed(tmp_path, "oscillator", "cycle.steps_per_period", [100, 200], "--set", "transient.enabled=false", "--set",
+                   "cycle.tolerance=1e-9")
+    first, second, limit, bar = map(float, re.search(r"^\| cycle period \[s\] \| (\S+) \| (\S+) \|.*\| (\S+) \+- (\S+) \|$", text, re.M).groups())
+    assert abs(limit - 5.954461004653) <= bar <= abs(second - first)
 
 
 def test_the_frequencies_of_a_clamped_disc_converge_with_its_mesh(tmp_path):

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from conftest import INPUTS, ROOT
-from test_mesh_error import BAR, ELEMENTS, SCENE
+from mesh_cases import BAR, BAR_SCENE, ELEMENTS
 
 sys.path.insert(0, str(ROOT / "tools"))
 from squeal import Results  # noqa: E402
@@ -27,8 +27,8 @@ Physical Surface("y") = {3, 4}; Physical Surface("z") = {5, 6};
 
 
 def bar(squeal, folder, geometry, *options):
-    (folder / "bar.geo").write_text(geometry)
-    (folder / "scene.toml").write_text(SCENE)
+    (folder / "mesh.geo").write_text(geometry)
+    (folder / "scene.toml").write_text(BAR_SCENE)
     run = squeal(folder / "scene.toml", "-modes_shapes", "all", *options, ranks=1)
     assert run.code == 0, run.printed + run.errors
     return Results(run.output)
@@ -39,7 +39,7 @@ def test_the_parts_of_the_elements_sum_to_the_true_error(squeal, tmp_path, eleme
     """Of a clamped bar, within a factor of 2 (0.71 to 1.74 seen); all of them have the sign of the error."""
     first, extrusion, order = ELEMENTS[element]
     for n in (4, 8) if not order else (4,):
-        mode = estimate(bar(squeal, tmp_path, BAR % (n, first, extrusion, order))).modes[0]
+        mode = estimate(bar(squeal, tmp_path, BAR.format(n=n, surface=first, layers=extrusion, order=order))).modes[0]
         true = LAM - mode.lam
         for sum_of_parts, error in ((mode.change.imag, true.imag), (mode.change.real, true.real)):
             assert 0.5 < sum_of_parts / error < 2
@@ -123,15 +123,15 @@ def converge(folder, *arguments):
 def test_converge_ends_where_the_bar_is_met_or_the_limit(tmp_path):
     """By sizes to 0.05 % of the growth rate, code 0, with fewer degrees of freedom than all sizes alike; code 2 at --most; transfinite
     curves take no sizes, which is said, and the bar falls by division of the elements or by a number of the geometry."""
-    (tmp_path / "bar.geo").write_text(BOX)
-    (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "mesh.geo").write_text(BOX)
+    (tmp_path / "scene.toml").write_text(BAR_SCENE)
     code, text, dofs, bars = converge(tmp_path, "--part", "0.0005", "--alone")
     assert code == 0 and len(dofs) > 1 and bars[-1] <= 0.05 < bars[0] and "sizes by the estimate" in text, text
     assert (tmp_path / "path" / "converge.png").stat().st_size > 5000
     code, text, dofs, _ = converge(tmp_path, "--part", "1e-4", "--alone", "--most", "200")
     assert code == 2 and max(dofs) <= 200 and "--most 200 allows no more" in text, text
-    (tmp_path / "bar.geo").write_text(BAR.replace("n = %d", "DefineConstant[n = 2]").replace("%s", "") % ())
-    (tmp_path / "scene.toml").write_text(SCENE.replace('"bar.geo"', '"bar.geo", parameters = { n = 2 }'))
+    (tmp_path / "mesh.geo").write_text(BAR.replace("n = {n};", "DefineConstant[n = {n}];").format(n=2, surface="", layers="", order=""))
+    (tmp_path / "scene.toml").write_text(BAR_SCENE.replace('"mesh.geo"', '"mesh.geo", parameters = { n = 2 }'))
     code, text, dofs, bars = converge(tmp_path, "--part", "0.01")
     assert code == 0 and "its mesh takes no sizes" in text and "mesh.refine = 1" in text, text
     code, text, dofs, bars = converge(tmp_path, "--part", "0.01", "--by", "mesh.parameters.n")
@@ -140,8 +140,8 @@ def test_converge_ends_where_the_bar_is_met_or_the_limit(tmp_path):
 
 def test_a_size_field_is_for_geometries(squeal, tmp_path):
     """A mesh file has its sizes: one message; so has a field that is missing."""
-    (tmp_path / "bar.geo").write_text(BOX)
-    (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "mesh.geo").write_text(BOX)
+    (tmp_path / "scene.toml").write_text(BAR_SCENE)
     run = squeal(tmp_path / "scene.toml", "--set", "mesh.size_field=none.pos", ranks=1)
     assert run.code == 1 and len(run.messages) == 1 and "none.pos" in run.messages[0], run.errors
     (tmp_path / "bar.msh").write_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n")

@@ -27,7 +27,7 @@ def densities(found: MeshEstimate, mode: ModeEstimate) -> np.ndarray:
 
 
 def write_fields(run: Results, found: MeshEstimate) -> Path:
-    """mesh_error.h5 and the .xdmf that ParaView opens: of each mode the parts of the elements, real, imaginary and by volume."""
+    """mesh_error.h5 and the .xdmf that ParaView opens: of each mode the parts of the elements, real, imaginary, by closed pairs and by volume."""
     place = run.folder / f"{NAME}.xdmf"
     topology = run.field("mesh/topology")
     item = '<DataItem Dimensions="{size}" NumberType="{kind}" Precision="{bytes}" Format="HDF">{file}.h5:/{data}</DataItem>'
@@ -43,6 +43,7 @@ def write_fields(run: Results, found: MeshEstimate) -> Path:
             what = f"mode {mode.number}, {mode.lam.imag / (2 * np.pi):.0f} Hz: mesh error of"
             for name, words, values in (("growth", "growth rate [1/s]", mode.of_cells.real),
                                         ("frequency", "frequency [Hz]", mode.of_cells.imag / (2 * np.pi)),
+                                        ("contact", "growth rate by closed pairs [1/s]", mode.of_contact.real),
                                         ("density", "eigenvalue, by volume [1/(s m3)]", densities(found, mode))):
                 data = f"modes/{mode.number}/{name}"
                 file[data] = values

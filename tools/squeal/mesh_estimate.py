@@ -7,8 +7,14 @@ a mode phi, of the slope psi'Q'(lambda) phi = 1, an eigenvalue is off by
     lambda - lambda_h = sum over elements of int (e*(psi) - e(psi))' D (e*(phi) - e(phi)) (1 + beta lambda + i eta) dV
 
 Without a left vector the conjugate of phi takes its place, and the slope is that of a structure which is all solids: then friction
-does not turn the answer. Caveats: shells, beams, springs and the error of the contact conditions have no part in it; a mesh that
-is too coarse for a mode has nothing to recover.
+does not turn the answer.
+
+A growth rate is a small part of an eigenvalue, and the phase of this sum is not sharp enough to tell its sign where it is below a tenth
+of the whole. Where the run has the modes on a finer mesh (modes.mesh_error), the parts are turned and scaled by one factor, so that
+their sum is what the shape functions leave open there, with the closed pairs held. What closed pairs that changed make of it is the
+contact's part. It is given to the elements of the slave side, by how far the pressure at their nodes is below its mean.
+
+Caveats: shells, beams and springs have no part in it; a mesh that is too coarse for a mode has nothing to recover.
 """
 
 import tomllib
@@ -24,6 +30,17 @@ from squeal.surface import elements as elements_of
 
 CHUNK = 512  # elements at a time
 MODES = 8  # at most so many
+SURE = 0.1  # part of the eigenvalue's change from which on its phase is sharp enough for the growth rate
+
+
+def refined_parts(refined: dict[str, Any]) -> tuple[complex, complex]:
+    """What the finer mesh adds to an eigenvalue [1/s]: by its shape functions with the closed pairs held, and by those that changed, or
+    how large what others may make is."""
+    def of(name: str) -> complex:
+        return complex(refined[name + "growth_rate"], 2 * np.pi * refined[name + "frequency_hz"])
+
+    smooth, contact = of("held_") - of(""), of("finer_") - of("held_")
+    return 1.5 * smooth, contact or complex(refined["growth_error"] - abs(smooth.real) / 2)
 
 
 @dataclass
@@ -47,20 +64,14 @@ class ModeEstimate:
     lam: complex  # [1/s] on this mesh
     of_cells: np.ndarray  # complex [1/s], of each element of the file
     with_left: bool
+    change: complex  # what the recovered strains add to the eigenvalue [1/s]
+    of_contact: np.ndarray  # [1/s], of each element: by closed pairs that change
     refined: dict[str, Any] = field(default_factory=dict)  # modes.mesh_error of the report
 
     @property
-    def change(self) -> complex:
-        """What is to be added to the eigenvalue [1/s]."""
-        return complex(self.of_cells.sum())
-
-    @property
-    def refined_change(self) -> complex | None:
-        """The same by the finer mesh, where the run had one."""
-        if not self.refined:
-            return None
-        hertz = self.refined["corrected_frequency_hz"] - self.refined["frequency_hz"]
-        return complex(self.refined["corrected_growth_rate"] - self.refined["growth_rate"], 2 * np.pi * hertz)
+    def is_sure(self) -> bool:
+        """Whether the recovered strains tell the sign of the growth rate's change."""
+        return not self.with_left or abs(self.change.real) > SURE * abs(self.change)
 
 
 @dataclass
@@ -239,6 +250,21 @@ def contact_elements(run: Results, blocks: list[Block], cells: int) -> np.ndarra
     return result
 
 
+def border_shares(run: Results, blocks: list[Block], cells: int) -> np.ndarray:
+    """Of each element the part of the contact's border at its nodes: how far the pressure there is below its mean; they sum to 1."""
+    result = np.zeros(cells)
+    try:
+        nodes, pressure, area = (run.field(f"pairs/{name}") for name in ("node", "pressure", "area"))
+    except Missing:
+        return result
+    at_nodes = np.zeros(len(run.nodes))
+    mean = (pressure * area).sum() / max(area.sum(), 1e-300)
+    at_nodes[nodes] = np.maximum(1 - pressure / max(mean, 1e-300), 0)
+    for block in blocks:
+        result[block.cells] = at_nodes[block.nodes].mean(axis=1)
+    return result / max(result.sum(), 1e-300)
+
+
 def estimate(run: Results) -> MeshEstimate:
     """The estimate of a run's modes; Missing where it has no shapes or no solids."""
     scene = scene_of(run)
@@ -260,6 +286,12 @@ def estimate(run: Results) -> MeshEstimate:
     refined = run.report["modes"].get("mesh_error", {}).get("modes", [])
     of_mode = [next((entry for entry in refined if abs(entry["frequency_hz"] / mode["frequency_hz"] - 1) < 1e-6
                      and np.isfinite(entry.get("finer_frequency_hz") or np.nan)), {}) for mode in modes]
-    estimates = [ModeEstimate(mode["number"], lam[k], of_cells[:, k] / slopes[k], bool(known[k]), of_mode[k]) for k, mode in enumerate(modes)]
+    border = border_shares(run, blocks, cells)
+    estimates = []
+    for k, mode in enumerate(modes):
+        parts, change = of_cells[:, k] / slopes[k], complex(of_cells[:, k].sum() / slopes[k])
+        smooth, contact = refined_parts(of_mode[k]) if of_mode[k] else (change, 0)
+        estimates.append(ModeEstimate(mode["number"], lam[k], parts * (smooth / change if change else 1), bool(known[k]), change,
+                                      contact * border, of_mode[k]))
     return MeshEstimate(estimates, blocks, [part["name"] for part in scene["part"]], run.nodes, cells,
                         contact_elements(run, blocks, cells))

@@ -82,7 +82,10 @@ def wanted_factors(found: MeshEstimate, left: dict[int, float]) -> list[np.ndarr
     error that may stay."""
     q = np.concatenate([np.full(len(block.cells), 2.0 * KINDS[block.code].order) for block in found.blocks])
     cells = np.concatenate([block.cells for block in found.blocks])
-    asked = [factors_for(np.abs(mode.of_cells[cells]), q, left[mode.number]) for mode in found.modes if mode.number in left]
+    modes = [mode for mode in found.modes if mode.number in left]
+    asked = [factors_for(np.abs(mode.of_cells[cells]), q, left[mode.number]) for mode in modes]
+    # the border of the contact falls between nodes: the first order
+    asked += [factors_for(np.abs(mode.of_contact[cells]), np.ones(len(cells)), left[mode.number]) for mode in modes if mode.of_contact.any()]
     if not asked:
         raise SquealError("no mode says what the sizes are to be for")
     return np.split(np.min(asked, axis=0), np.cumsum([len(block.cells) for block in found.blocks])[:-1])
