@@ -21,6 +21,9 @@ MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencie
         MotionKind::undecided, "quasi-periodic and weakly irregular",
         "neither the probe that swings most nor the normal force shows a second frequency: a [[probe]] elsewhere, or "
         "more periods"};
+  constexpr double width = 4; // of a line under the Hann window, points of the spectrum
+  if (std::abs(base.second - std::round(base.second / base.first) * base.first) * length < width * base.first)
+    return {MotionKind::undecided, "quasi-periodic and a cycle", "the lines are not apart: more periods would decide"};
   if (base.explained < 0.8)
     return {MotionKind::undecided, "quasi-periodic and weakly irregular",
             format("%.0f %% of the side bands are at combinations of two frequencies: more periods would decide",

@@ -119,7 +119,8 @@ BaseFrequencies base_frequencies(const Spectrum& spectrum, double first)
   {
     if (is_combination(line.frequency_hz, base.first, 0, resolution)) continue;
     // the powers of a line's points sum to 1.5 times its square
-    if (is_combination(line.frequency_hz, base.first, base.second, resolution))
+    if (is_combination(line.frequency_hz, base.first, base.second, resolution) ||
+        (base.second > 0 && is_combination(line.frequency_hz, base.second, base.first, resolution)))
       explained += 1.5 * line.amplitude * line.amplitude;
   }
   base.explained = all > 0 ? std::min(1., explained / all) : 1;

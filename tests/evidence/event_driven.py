@@ -230,15 +230,15 @@ class Reference:
             x, status, _, sums = self.flow(x, period, status, relative=1e-9)
             energies.append(sums[0] / period)
         energies = np.array(energies)
-        _, _, rows, _ = self.flow(x, 40 * period, status, 40 * 200)
+        _, _, rows, _ = self.flow(x, 24 * period, status, 24 * 200, relative=1e-9)
         size = np.mean(self.size(rows))
-        lags = [np.mean(self.distance(rows[lag:lag + 2000:20], rows[:2000:20])) / size for lag in range(40, 6000)]
+        lags = [np.mean(self.distance(rows[lag:lag + 2000:20], rows[:2000:20])) / size for lag in range(40, 2800)]
         lag = 40 + int(np.argmin(lags))
         first = next((40 + i for i, d in enumerate(lags) if d < 1.5 * min(lags) + 0.02), lag)
         batches = energies[len(energies) % 16:].reshape(16, -1).mean(1)
         bar = 2.13 * batches.std(ddof=1) / 4
         half = len(energies) // 2
-        return dict(state=x, statuses=status, closes=first * period / 200, energy=energies.mean(), bar=bar,
+        return dict(state=x, statuses=status, closes=first * period / 200, misses=min(lags), energy=energies.mean(), bar=bar,
                     drift=energies[half:].mean() - energies[:half].mean(), spread=energies[half:].std() / energies.mean(),
                     earlier=energies[:half // 2].std() / energies.mean())
 

@@ -117,8 +117,8 @@ def compare_cycle(report, ref, state, line):
 def kind_of(ref, motion, period):
     """Kind of a motion by events: it closes, neighbours part, or neither."""
     try:
-        closed = ref.cycle(motion["state"], motion["closes"])
-        if abs(closed["multipliers"][0]) < 1 + closed["noise"]:
+        closed = ref.cycle(motion["state"], motion["closes"]) if motion["misses"] < 0.1 else None
+        if closed and abs(closed["multipliers"][0]) < 1 + closed["noise"]:
             return "periodic", closed, None
     except (ArithmeticError, np.linalg.LinAlgError):
         pass

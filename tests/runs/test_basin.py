@@ -43,6 +43,21 @@ def test_a_torus_is_what_the_motion_settles_on(squeal, tmp_path):
     assert "no cycle attracts that was found: quasi-periodic" in run.printed and report["heard"] in run.printed
 
 
+def test_frequencies_of_a_torus_that_are_near_are_told_apart(squeal, tmp_path):
+    """Two oscillators that do not touch, one drive faster: 0.5 % between their frequencies, and each has many harmonics. Known
+    are periods and energies of either alone, by event-driven integration (tests/evidence/events.cpp)."""
+    report = squeal(*two_oscillators(tmp_path, slower=1.0), "--set", "contact.1.velocity=[1,0,0]", ranks=1).report
+    settled = report["settled"]
+    assert settled["outcome"] == "settled" and settled["kind"] == "quasi-periodic"
+    known = [1 / 5.98455511, 1 / 5.95446100]
+    base, bar = settled["base_frequencies_hz"], settled["lines"][0]["frequency_error"]
+    seen = sorted([base["first"], base["second"]])
+    assert bar < 3e-4 and all(abs(a - b) <= bar for a, b in zip(seen, known))
+    assert seen[1] - seen[0] == pytest.approx(known[1] - known[0], rel=0.05)
+    mean = settled["mean_fluctuating_energy"]
+    assert abs(mean["mean"] - 1.47848496 - 2.14857439) <= mean["error"] + settled["step_error"] < 0.02
+
+
 def test_a_phase_between_equal_neighbours_is_neither_stable_nor_unstable(squeal, tmp_path):
     """Two equal oscillators that do not touch: nothing changes their phase difference, whose multiplier is exactly 1. The grid
     of time moves it, as it moves a shift in time."""
