@@ -255,7 +255,7 @@ extern "C"
     VectorXd before(2 * s.pairs), after(2 * s.pairs);
     Step step;
     std::fill(sums, sums + 5, 0.0);
-    for (long count = 0; t < time; ++count)
+    while (samples > 0 ? stored < samples : t < time)
     {
       const double stop = samples > 0 ? time * (stored + 1) / samples : time;
       h = std::min(h, longest);
