@@ -1,11 +1,11 @@
 #include "squeal/find_motion.hpp"
 
 #include "squeal/algebra/multivector.hpp"
-#include "squeal/attractors/reached.hpp"
+#include "squeal/attractors/attractors.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/cycle/cycle_checkpoint.hpp"
+#include "squeal/cycle/limit_cycle.hpp"
 
 #include <algorithm>
 #include <array>

@@ -3,11 +3,11 @@
 #include "squeal/base/constants.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/equilibrium/tighten.hpp"
-#include "squeal/mesh/shapes.hpp"
-#include "squeal/mesh/ties.hpp"
-#include "squeal/solid/matrix_rows.hpp"
-#include "squeal/solid/sparse_rows.hpp"
+#include "squeal/equilibrium/equilibrium.hpp"
+#include "squeal/mesh/contact_pairs.hpp"
+#include "squeal/mesh/shape_functions.hpp"
+#include "squeal/solid/binary.hpp"
+#include "squeal/solid/structure.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 
 #include "squeal/base/cost.hpp"
 #include "squeal/mesh/mesh.hpp"
-#include "squeal/modes/modes_checkpoint.hpp"
+#include "squeal/modes/modes.hpp"
 
 #include <algorithm>
 

@@ -2,10 +2,10 @@
 
 #include "squeal/base/free_memory.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/find_motion.hpp"
 #include "squeal/forecast.hpp"
 #include "squeal/mesh_error.hpp"
 #include "squeal/scene/numbers.hpp"
-#include "squeal/studies.hpp"
 
 #include <algorithm>
 #include <cstdio>

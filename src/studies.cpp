@@ -1,4 +1,4 @@
-#include "squeal/studies.hpp"
+#include "squeal/find_motion.hpp"
 
 #include <algorithm>
 #include <array>

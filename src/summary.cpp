@@ -1,8 +1,7 @@
 /// Size, masses and warnings of a model, as far as they are known before anything is solved.
 #include "squeal/base/constants.hpp"
-#include "squeal/mesh/quadrature.hpp"
-#include "squeal/mesh/shapes.hpp"
-#include "squeal/mesh/ties.hpp"
+#include "squeal/mesh/contact_pairs.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 #include "squeal/model.hpp"
 
 #include <algorithm>

@@ -2,7 +2,7 @@
 /// nonsymmetric eigenproblem (geev), a linear system with as many right-hand sides as rows (gesv) and the symmetric
 /// definite eigenproblem (sygv). Prints median processor seconds of both and their ratio.
 #include "bench_timing.hpp"
-#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
 
 #include <cstdio>
 #include <Eigen/Eigenvalues>

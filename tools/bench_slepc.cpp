@@ -11,7 +11,7 @@
 #include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/model.hpp"
-#include "squeal/modes/pair_search.hpp"
+#include "squeal/modes/modes.hpp"
 #include "squeal/modes/real_modes.hpp"
 #include "squeal/scene/scene.hpp"
 

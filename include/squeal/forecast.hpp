@@ -2,7 +2,7 @@
 /// What a run will take, before its first stage (src/README.md, section 8.9).
 #include "squeal/model.hpp"
 #include "squeal/options.hpp"
-#include "squeal/report/stage.hpp"
+#include "squeal/report/report.hpp"
 
 #include <vector>
 

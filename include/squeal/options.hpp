@@ -2,7 +2,7 @@
 /// All options of squeal in one table, read and refused together; and the prefixes by which PETSc's, SLEPc's and
 /// MUMPS's objects take theirs.
 #include "squeal/algebra/bordered_factor.hpp"
-#include "squeal/cycle/options.hpp"
+#include "squeal/cycle/limit_cycle.hpp"
 #include "squeal/report/report.hpp"
 #include "squeal/scene/described.hpp"
 #include "squeal/settled/motion.hpp"

@@ -1,7 +1,7 @@
 #include "squeal/algebra/bordered_factor.hpp"
 
 #include "cholesky.hpp"
-#include "squeal/algebra/pencil_factor.hpp"
+#include "squeal/algebra/shift_invert.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/free_memory.hpp"

@@ -1,5 +1,4 @@
 #include "cholesky.hpp"
-
 #include "front.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/base/error.hpp"
@@ -208,6 +207,191 @@ double cholesky_memory(const SymbolicFactor& symbolic)
 double cholesky_memory(const TreeShare& share)
 {
   return memory_of(share.symbolic, work_sizes(share.symbolic, share.shared));
+}
+
+// The two halves of a solve with the Cholesky factor.
+
+namespace
+{
+
+/// The triangle of a supernode and the panels below it.
+struct Packed
+{
+  const double* triangle;
+  Panel inner, border;
+};
+
+/// Supernode k in the packed factor. Of shared supernodes both panels follow each other; of others `inner` holds all
+/// rows below.
+Packed packed_supernode(const TreeShare& share, std::size_t k, const std::vector<double>& values)
+{
+  const Supernode& supernode = share.symbolic.supernodes[k];
+  const std::size_t pivots = at(supernode.columns), below = at(supernode.below);
+  const std::size_t rows = k >= share.own ? at(supernode.inner()) : below;
+  Packed packed{&values[supernode.values_begin], {}, {}};
+  packed.inner = {packed.triangle + packed_triangle(pivots), rows, pivots};
+  packed.border = {packed.inner.values + packed_panel(rows, pivots), below - rows, pivots};
+  return packed;
+}
+
+/// x at the rows -= L times the pivots' own entries.
+void subtract_below(const Panel& L, const int* rows, std::size_t lanes, const double* own, double* x,
+                    std::vector<double>& part)
+{
+  part.assign((L.rows + tile) * lanes, 0.);
+  subtract_product(L, lanes, own, part.data());
+  for (std::size_t i = 0; i < L.rows; ++i)
+    for (std::size_t l = 0; l < lanes; ++l) x[at(rows[i]) * lanes + l] += part[i * lanes + l];
+}
+
+/// own -= L' times x at the rows.
+void subtract_above(const Panel& L, const int* rows, std::size_t lanes, const double* x, double* own,
+                    std::vector<double>& part)
+{
+  part.assign((L.rows + tile) * lanes, 0.);
+  for (std::size_t i = 0; i < L.rows; ++i)
+    for (std::size_t l = 0; l < lanes; ++l) part[i * lanes + l] = x[at(rows[i]) * lanes + l];
+  subtract_transposed(L, lanes, part.data(), own);
+}
+
+} // namespace
+
+PositionExchange::PositionExchange(const RowLayout& layout, const std::vector<int>& position,
+                                   const std::vector<int>& owner, MPI_Comm comm)
+{
+  const int ranks = ranks_of(comm), me = rank_of(comm);
+  std::vector<PetscSFNode> from;
+  for (int rank = 0; rank < ranks; ++rank)
+    for (int i = 0; i < layout.counts[static_cast<std::size_t>(rank)]; ++i)
+    {
+      const int row = layout.starts[static_cast<std::size_t>(rank)] + i;
+      const auto place = static_cast<std::size_t>(position[static_cast<std::size_t>(row)]);
+      const int target = owner.empty() || owner[place] < 0 ? rank : owner[place];
+      if (target != me) continue;
+      positions_.push_back(place);
+      from.push_back({rank, i});
+    }
+  check(PetscSFCreate(comm, rows_.put()));
+  check(PetscSFSetGraph(rows_, layout.counts[static_cast<std::size_t>(me)], static_cast<PetscInt>(from.size()), nullptr,
+                        PETSC_COPY_VALUES, from.data(), PETSC_COPY_VALUES));
+}
+
+void PositionExchange::gather(std::span<const double* const> b, std::size_t lanes, std::vector<double>& x) const
+{
+  std::vector<double> in(positions_.size());
+  for (std::size_t k = 0; k < b.size(); ++k)
+  {
+    check(PetscSFBcastBegin(rows_, MPI_DOUBLE, b[k], in.data(), MPI_REPLACE));
+    check(PetscSFBcastEnd(rows_, MPI_DOUBLE, b[k], in.data(), MPI_REPLACE));
+    for (std::size_t i = 0; i < in.size(); ++i) x[positions_[i] * lanes + k] = in[i];
+  }
+}
+
+void PositionExchange::scatter(const std::vector<double>& x, std::size_t lanes, std::span<double* const> b) const
+{
+  std::vector<double> out(positions_.size());
+  for (std::size_t k = 0; k < b.size(); ++k)
+  {
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = x[positions_[i] * lanes + k];
+    check(PetscSFReduceBegin(rows_, MPI_DOUBLE, out.data(), b[k], MPI_REPLACE));
+    check(PetscSFReduceEnd(rows_, MPI_DOUBLE, out.data(), b[k], MPI_REPLACE));
+  }
+}
+
+std::vector<double> Cholesky::forward(std::span<const double* const> b)
+{
+  const SymbolicFactor& symbolic = share_.symbolic;
+  columns_ = b.size();
+  lanes_ = lanes_for(columns_);
+  const std::size_t dofs = at(symbolic.dofs), border = at(symbolic.border);
+  work_.assign((dofs + border + tile) * lanes_, 0.);
+  exchange_.gather(b, lanes_, work_);
+  double* const x = work_.data();
+  std::vector<double> part;
+  for (std::size_t k = 0; k < symbolic.supernodes.size(); ++k)
+  {
+    const Supernode& supernode = symbolic.supernodes[k];
+    const Packed packed = packed_supernode(share_, k, values_);
+    double* const own = x + at(supernode.first) * lanes_;
+    if (k == share_.own) sum_shared_pivots();
+    solve_triangle(packed.triangle, at(supernode.columns), lanes_, own);
+    subtract_below(packed.inner, rows_of(supernode), lanes_, own, x, part);
+    if (packed.border.rows > 0)
+      subtract_below(packed.border, rows_of(supernode) + supernode.inner(), lanes_, own, x, part);
+  }
+  std::vector<double> result(border * columns_);
+  for (std::size_t i = 0; i < border; ++i)
+    for (std::size_t k = 0; k < columns_; ++k) result[k * border + i] = -x[(dofs + i) * lanes_ + k];
+  if (ranks_of(comm_) == 1) return result;
+  const bool first = rank_of(comm_) == 0;
+  MPI_Reduce(first ? MPI_IN_PLACE : result.data(), result.data(), to_int(result.size()), MPI_DOUBLE, MPI_SUM, 0, comm_);
+  if (!first) result.clear();
+  return result;
+}
+
+/// Adds up what the ranks have at the pivots of shared supernodes.
+void Cholesky::sum_shared_pivots()
+{
+  std::vector<double> sum;
+  const auto shared = std::span(share_.symbolic.supernodes).subspan(share_.own);
+  const auto begin_of = [&](const Supernode& supernode)
+  { return work_.begin() + static_cast<std::ptrdiff_t>(at(supernode.first) * lanes_); };
+  const auto size_of = [&](const Supernode& supernode) { return at(supernode.columns) * lanes_; };
+  for (const Supernode& supernode : shared)
+    sum.insert(sum.end(), begin_of(supernode), begin_of(supernode) + static_cast<std::ptrdiff_t>(size_of(supernode)));
+  MPI_Allreduce(MPI_IN_PLACE, sum.data(), to_int(sum.size()), MPI_DOUBLE, MPI_SUM, comm_);
+  const double* from = sum.data();
+  for (const Supernode& supernode : shared)
+  {
+    std::copy_n(from, size_of(supernode), begin_of(supernode));
+    from += size_of(supernode);
+  }
+}
+
+/// Subtracts E' lambda of all ranks from the pivots of shared supernodes.
+void Cholesky::subtract_shared_border()
+{
+  std::vector<double> sum, part;
+  const auto shared = std::span(share_.symbolic.supernodes).subspan(share_.own);
+  const auto size_of = [&](const Supernode& supernode) { return at(supernode.columns) * lanes_; };
+  for (std::size_t k = 0; k < shared.size(); ++k)
+  {
+    const std::size_t size = size_of(shared[k]);
+    sum.resize(sum.size() + size, 0.);
+    subtract_above(packed_supernode(share_, share_.own + k, values_).border, rows_of(shared[k]) + shared[k].inner(),
+                   lanes_, work_.data(), sum.data() + sum.size() - size, part);
+  }
+  MPI_Allreduce(MPI_IN_PLACE, sum.data(), to_int(sum.size()), MPI_DOUBLE, MPI_SUM, comm_);
+  const double* from = sum.data();
+  for (const Supernode& supernode : shared)
+    for (std::size_t i = 0; i < size_of(supernode); ++i) work_[at(supernode.first) * lanes_ + i] += *from++;
+}
+
+void Cholesky::backward(const std::vector<double>& lambda, std::span<double* const> x)
+{
+  const SymbolicFactor& symbolic = share_.symbolic;
+  const std::size_t dofs = at(symbolic.dofs), border = at(symbolic.border);
+  std::vector<double> of_rank_zero;
+  if (ranks_of(comm_) > 1)
+  {
+    of_rank_zero.resize(border * columns_);
+    if (rank_of(comm_) == 0) std::copy_n(lambda.begin(), of_rank_zero.size(), of_rank_zero.begin());
+    MPI_Bcast(of_rank_zero.data(), to_int(of_rank_zero.size()), MPI_DOUBLE, 0, comm_);
+  }
+  const std::vector<double>& forces = ranks_of(comm_) > 1 ? of_rank_zero : lambda;
+  for (std::size_t i = 0; i < border; ++i)
+    for (std::size_t k = 0; k < columns_; ++k) work_[(dofs + i) * lanes_ + k] = forces[k * border + i];
+  if (share_.own < symbolic.supernodes.size()) subtract_shared_border();
+  std::vector<double> part;
+  for (std::size_t k = symbolic.supernodes.size(); k-- > 0;)
+  {
+    const Supernode& supernode = symbolic.supernodes[k];
+    const Packed packed = packed_supernode(share_, k, values_);
+    double* const own = work_.data() + at(supernode.first) * lanes_;
+    subtract_above(packed.inner, rows_of(supernode), lanes_, work_.data(), own, part);
+    solve_transposed_triangle(packed.triangle, at(supernode.columns), lanes_, own);
+  }
+  exchange_.scatter(work_, lanes_, x);
 }
 
 } // namespace squeal

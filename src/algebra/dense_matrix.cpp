@@ -1,9 +1,15 @@
 #include "squeal/algebra/dense_matrix.hpp"
-
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
+#include <numeric>
+#include <utility>
 
 namespace squeal
 {
@@ -93,5 +99,313 @@ MatrixXd orthonormal_columns(const MatrixXd& A)
   const Eigen::HouseholderQR<MatrixXd> qr(A);
   return qr.householderQ() * MatrixXd::Identity(A.rows(), A.cols());
 }
+
+namespace
+{
+
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+using Eigen::VectorXcd;
+using Eigen::VectorXd;
+
+enum class Vectors
+{
+  right,
+  both
+};
+
+/// Eigenvalues mu of a matrix with their vectors as columns. Left ones u obey u^H A = mu u^H.
+struct Eigenvectors
+{
+  Eigen::VectorXcd mu;
+  Eigen::MatrixXcd left{}, right{}; // without columns: left ones are not wanted
+};
+
+template <class Complexes> lapack_complex_double* entries_of(Complexes& A)
+{
+  return reinterpret_cast<lapack_complex_double*>(A.data());
+}
+
+/// Vectors from LAPACK's columns for a real matrix: of conjugates the first one is the real part and the next one the
+/// imaginary part of the vector with Im(mu) > 0.
+MatrixXcd complex_columns(const VectorXcd& mu, const MatrixXd& packed)
+{
+  MatrixXcd columns = packed.cast<Complex>();
+  for (Index j = 0; j + 1 < columns.cols(); ++j)
+    if (mu(j).imag() > 0)
+    {
+      columns.col(j).imag() = packed.col(j + 1);
+      columns.col(j + 1) = columns.col(j).conjugate();
+      ++j;
+    }
+  return columns;
+}
+
+/// The letter that LAPACK's geev takes for left vectors, and their number.
+std::pair<char, Index> left_wanted(Vectors which, Index size)
+{
+  return which == Vectors::both ? std::pair('V', size) : std::pair('N', Index{0});
+}
+
+void need_convergence(int info)
+{
+  if (info != 0) throw Error("the QR algorithm did not converge on a dense eigenproblem");
+}
+
+/// Finds them by LAPACK. Error: the QR algorithm does not converge.
+Eigenvectors eigenvectors(MatrixXd A, Vectors which)
+{
+  const int size = to_int(A.rows());
+  const auto [wants_left, columns] = left_wanted(which, size);
+  VectorXd re(size), im(size);
+  MatrixXd left(size, columns), right(size, size);
+  need_convergence(LAPACKE_dgeev(LAPACK_COL_MAJOR, wants_left, 'V', size, A.data(), size, re.data(), im.data(),
+                                 left.data(), size, right.data(), size));
+  const VectorXcd mu = re.cast<Complex>() + Complex(0, 1) * im;
+  return {mu, complex_columns(mu, left), complex_columns(mu, right)};
+}
+
+Eigenvectors eigenvectors(MatrixXcd A, Vectors which)
+{
+  const int size = to_int(A.rows());
+  const auto [wants_left, columns] = left_wanted(which, size);
+  Eigenvectors all{VectorXcd(size), MatrixXcd(size, columns), MatrixXcd(size, size)};
+  need_convergence(LAPACKE_zgeev(LAPACK_COL_MAJOR, wants_left, 'V', size, entries_of(A), size, entries_of(all.mu),
+                                 entries_of(all.left), size, entries_of(all.right), size));
+  return all;
+}
+
+template <class Matrix> double norm_1(const Matrix& A)
+{
+  return A.size() > 0 ? A.cwiseAbs().colwise().sum().maxCoeff() : 0;
+}
+
+/// LU with row interchanges. Throws Error with the text `singular` if a pivot is zero.
+template <class Matrix> Eigen::PartialPivLU<Matrix> regular_factor(const Matrix& A, const char* singular)
+{
+  if (!A.allFinite()) throw Error(singular); // LAPACK would return without the permutation that Eigen then applies
+  Eigen::PartialPivLU<Matrix> factor(A);
+  if ((factor.matrixLU().diagonal().cwiseAbs().array() == 0).any()) throw Error(singular);
+  return factor;
+}
+
+/// A^-T x
+MatrixXcd solve_transposed(const Eigen::PartialPivLU<MatrixXd>& A, const MatrixXcd& x)
+{
+  MatrixXcd result(x.rows(), x.cols());
+  result.real() = A.transpose().solve(x.real());
+  result.imag() = A.transpose().solve(x.imag());
+  return result;
+}
+
+MatrixXcd solve_transposed(const Eigen::PartialPivLU<MatrixXcd>& A, const MatrixXcd& x)
+{
+  return A.transpose().solve(x);
+}
+
+/// The pairs of a quadratic problem with Im(lambda) >= 0 and |lambda| <= limit, and the wanted vectors.
+///
+/// With lambda = omega nu, nu = shift + 1/mu and Q = Q(shift) of the scaled matrices, Q mu^2 + (C + 2 shift M) mu + M
+/// is singular. Its companion matrix is [-Q^-1 (C + 2 shift M), -Q^-1 M; I, 0] on (mu y, y). Left vectors of the
+/// quadratic problem are Q^-T conj(a) by those (a, b) of the companion matrix.
+template <class Matrix> std::vector<TwoSidedPair> solve_companion(const Matrix& M, const Matrix& C, const Matrix& K,
+                                                                  Vectors which, double limit)
+{
+  std::vector<TwoSidedPair> result;
+  const Index n = K.rows();
+  const double stiffness = norm_1(K), mass = norm_1(M);
+  if (mass == 0 || stiffness == 0) return result;
+  const double largest = std::sqrt(stiffness / mass); // far above all eigenvalues a limit is no scale
+  const bool all = !(limit < largest);
+  const double omega = all ? largest : limit;
+  const double shift = all ? 1e-2 : 0.2; // of nu: any that is no eigenvalue
+  const Matrix m = omega * omega / stiffness * M, c = omega / stiffness * C, k = K / stiffness;
+  const auto factor =
+      regular_factor(Matrix(k + shift * (c + shift * m)),
+                     "the quadratic eigenproblem is singular: some motion has neither mass nor stiffness");
+  Matrix A = Matrix::Zero(2 * n, 2 * n);
+  A.topLeftCorner(n, n) = factor.solve(-c - 2 * shift * m);
+  A.topRightCorner(n, n) = factor.solve(-m);
+  A.bottomLeftCorner(n, n).setIdentity();
+  const auto [mu, left, right] = eigenvectors(std::move(A), which);
+  std::vector<Index> chosen;
+  for (Index j = 0; j < mu.size(); ++j) // Im(lambda) >= 0, and lambda is finite: it is not without mass
+    if (mu(j).imag() <= 0 && std::abs(mu(j)) >= 1e-12 && !(omega * std::abs(shift + 1.0 / mu(j)) > limit))
+      chosen.push_back(j);
+  MatrixXcd chi;
+  if (left.cols() > 0) chi = solve_transposed(factor, left(Eigen::seqN(0, n), chosen).conjugate());
+  for (Index place = 0; const Index j : chosen)
+  {
+    TwoSidedPair& pair = result.emplace_back();
+    pair.lambda = omega * (shift + 1.0 / mu(j));
+    // of mu y and y the one of larger entries
+    pair.right = right.col(j).segment(std::abs(mu(j)) > 1 ? 0 : n, n).normalized();
+    if (left.cols() > 0) pair.left = chi.col(place++).normalized();
+  }
+  return result;
+}
+
+std::vector<DenseEigenpair> right_pairs(std::vector<TwoSidedPair> pairs)
+{
+  std::vector<DenseEigenpair> result;
+  for (TwoSidedPair& pair : pairs) result.push_back({pair.lambda, std::move(pair.right)});
+  return result;
+}
+
+/// Gives every rank the pairs of rank 0, whose vectors have the names `vectors` and `rows` entries.
+template <class Pair> void share_pairs(MPI_Comm comm, std::vector<Pair>& pairs, Index rows,
+                                       std::initializer_list<Eigen::VectorXcd Pair::*> vectors)
+{
+  int count = to_int(pairs.size());
+  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
+  pairs.resize(static_cast<std::size_t>(count));
+  for (Pair& pair : pairs)
+  {
+    MPI_Bcast(&pair.lambda, 1, MPI_CXX_DOUBLE_COMPLEX, 0, comm);
+    for (const auto member : vectors)
+    {
+      (pair.*member).resize(rows);
+      MPI_Bcast((pair.*member).data(), to_int(rows), MPI_CXX_DOUBLE_COMPLEX, 0, comm);
+    }
+  }
+}
+
+} // namespace
+
+Eigen::MatrixXcd vectors_of(std::span<const TwoSidedPair> pairs, Eigen::VectorXcd TwoSidedPair::*side)
+{
+  if (pairs.empty()) return {};
+  Eigen::MatrixXcd vectors((pairs.front().*side).size(), static_cast<Index>(pairs.size()));
+  for (Index column = 0; const TwoSidedPair& pair : pairs) vectors.col(column++) = pair.*side;
+  return vectors;
+}
+
+void share(MPI_Comm comm, std::vector<TwoSidedPair>& pairs, Index rows)
+{
+  share_pairs(comm, pairs, rows, {&TwoSidedPair::right, &TwoSidedPair::left});
+}
+
+template <class Matrix> std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const Matrix& M,
+                                                                         const Matrix& C, const Matrix& K, double limit)
+{
+  std::vector<TwoSidedPair> pairs;
+  on_rank_zero(comm, [&] { pairs = solve_companion(M, C, K, Vectors::both, limit); });
+  share(comm, pairs, K.rows());
+  return pairs;
+}
+
+template <class Matrix> std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Matrix& M,
+                                                                                 const Matrix& C, const Matrix& K)
+{
+  std::vector<DenseEigenpair> pairs;
+  on_rank_zero(comm, [&] { pairs = right_pairs(solve_companion(M, C, K, Vectors::right, HUGE_VAL)); });
+  share_pairs(comm, pairs, K.rows(), {&DenseEigenpair::y});
+  return pairs;
+}
+
+SymmetricEigenpairs solve_dense_symmetric(MatrixXd A)
+{
+  VectorXd lambda(A.rows());
+  const int size = to_int(A.rows());
+  if (size > 0 && LAPACKE_dsyevd(LAPACK_COL_MAJOR, 'V', 'L', size, A.data(), size, lambda.data()) != 0)
+    throw Error("the eigenvalues of a symmetric matrix did not converge");
+  return {std::move(lambda), std::move(A)};
+}
+
+SymmetricEigenpairs solve_dense_symmetric(const MatrixXd& M, const MatrixXd& K, double shift)
+{
+  // M y = theta (K - shift M) y with theta = 1/(lambda - shift) allows a singular M. With K - shift M = L L' it is
+  // L^-1 M L^-T z = theta z.
+  if (K.rows() == 0) return {};
+  const Eigen::LLT<MatrixXd> factor(K - shift * M);
+  if (factor.info() != Eigen::Success)
+    throw Error("the real modes fail: stiffness is not positive semidefinite, or some motion has neither "
+                "mass nor stiffness");
+  const MatrixXd half = factor.matrixL().solve(M);
+  const SymmetricEigenpairs pairs = solve_dense_symmetric(factor.matrixL().solve(half.transpose()));
+  const VectorXd theta = pairs.lambda.reverse();
+  const Index finite = (theta.array() > 1e-14 * theta(0)).count();
+  const VectorXd kept = theta.head(finite);
+  return {(shift + kept.array().inverse()).matrix(),
+          factor.matrixU().solve(pairs.y.rowwise().reverse().leftCols(finite)) *
+              kept.cwiseSqrt().cwiseInverse().asDiagonal()};
+}
+
+SymmetricEigenpairs solve_dense_symmetric_shared(MPI_Comm comm, const MatrixXd& M, const MatrixXd& K, double shift)
+{
+  SymmetricEigenpairs pairs;
+  on_rank_zero(comm, [&] { pairs = solve_dense_symmetric(M, K, shift); });
+  broadcast(pairs.lambda, comm);
+  broadcast(pairs.y, comm);
+  return pairs;
+}
+
+std::vector<DenseEigenpair> solve_dense_unsymmetric(const MatrixXd& A)
+{
+  std::vector<DenseEigenpair> pairs;
+  if (A.rows() == 0) return pairs;
+  const auto [mu, left, right] = eigenvectors(A, Vectors::right);
+  for (Index i = 0; i < mu.size(); ++i)
+    pairs.push_back({mu(i), right.col(i).normalized()}); // conjugates are neighbours
+  std::ranges::stable_sort(pairs, std::greater{}, [](const DenseEigenpair& pair) { return std::abs(pair.lambda); });
+  return pairs;
+}
+
+Eigen::MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Eigen::Index size)
+{
+  Eigen::MatrixXd result(size, static_cast<Eigen::Index>(pairs.size()));
+  for (Eigen::Index i = 0; i < result.cols(); ++i)
+  {
+    const DenseEigenpair& pair = pairs[static_cast<std::size_t>(i)];
+    result.col(i) = pair.lambda.imag() < 0 ? Eigen::VectorXd(-pair.y.imag()) : Eigen::VectorXd(pair.y.real());
+  }
+  return result;
+}
+
+std::vector<std::complex<double>> values_of(const std::vector<DenseEigenpair>& pairs)
+{
+  std::vector<std::complex<double>> values;
+  for (const DenseEigenpair& pair : pairs) values.push_back(pair.lambda);
+  return values;
+}
+
+std::vector<std::size_t> nearest_places(const std::vector<std::complex<double>>& references,
+                                        const std::vector<std::complex<double>>& values)
+{
+  std::vector<std::size_t> places(values.size());
+  std::iota(places.begin(), places.end(), 0U);
+  const auto distance = [&](std::size_t reference, std::size_t place) // those beyond the references stay unmatched
+  { return reference < references.size() ? std::abs(values[place] - references[reference]) : 0; };
+  for (std::size_t i = 0; i < references.size(); ++i)
+    for (std::size_t k = i + 1; k < values.size(); ++k)
+      if (distance(i, places[k]) < distance(i, places[i])) std::swap(places[i], places[k]);
+  // an early reference may have taken what a later one needs more
+  const auto exchange = [&](std::size_t i, std::size_t k)
+  {
+    const double now = distance(i, places[i]) + distance(k, places[k]);
+    if (!(distance(i, places[k]) + distance(k, places[i]) < now * (1 - 1e-12))) return false;
+    std::swap(places[i], places[k]);
+    return true;
+  };
+  for (bool exchanged = true; exchanged;)
+  {
+    exchanged = false;
+    for (std::size_t i = 0; i < references.size(); ++i)
+      for (std::size_t k = i + 1; k < values.size(); ++k) exchanged = exchange(i, k) || exchanged;
+  }
+  places.resize(references.size());
+  return places;
+}
+
+template std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm, const MatrixXd&, const MatrixXd&, const MatrixXd&,
+                                                          double);
+template std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm, const MatrixXd&, const MatrixXd&,
+                                                                  const MatrixXd&);
+template std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&,
+                                                          const MatrixXcd&, double);
+template std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&,
+                                                                  const MatrixXcd&);
 
 } // namespace squeal

@@ -5,7 +5,7 @@
 /// by ranks, MUMPS adds up in the order in which messages arrive: results would change in rounding from run to run, and
 /// a restarted run would not give the straight run's numbers. A larger factor is shared, with the right-hand sides and
 /// solutions where their rows are.
-#include "squeal/algebra/pencil_factor.hpp"
+#include "squeal/algebra/shift_invert.hpp"
 
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"

@@ -2,7 +2,7 @@
 
 #include "squeal/base/run_control.hpp"
 
-#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 

@@ -1,18 +1,174 @@
 #include "squeal/attractors/attractors.hpp"
-
-#include "starts.hpp"
-
+#include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
+#include "squeal/base/random.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/transient/step_guards.hpp"
+#include "squeal/transient/theta_step.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 namespace squeal
 {
+
+namespace
+{
+
+constexpr std::size_t random_modes = 6; // the least stable ones
+
+State resting(const Equilibrium& equilibrium)
+{
+  return {copy_of(equilibrium.u.get()), zeros_like(equilibrium.u), 0, equilibrium.reactions};
+}
+
+/// Amplitudes of modes in random motions. [m]
+struct AmplitudeRange
+{
+  double least = 0, ratio = 1; // of the greatest to the least
+};
+
+/// A tenth to twice the largest estimate of an unstable mode. Beside an equilibrium that is stable, half the first
+/// event to four times the last one: what can attract is beyond the one, and may be beyond the other.
+AmplitudeRange amplitude_range(const UnstableModes& unstable)
+{
+  double amplitude = 0;
+  for (const Estimate& estimate : unstable.estimates)
+    if (std::isfinite(estimate.start_amplitude)) amplitude = std::max(amplitude, estimate.start_amplitude);
+  const Estimate& first = unstable.estimates.front();
+  if (unstable.modes.front().growth_rate() > 0 || !std::isfinite(first_event(first))) return {0.1 * amplitude, 20};
+  double last = 0;
+  for (const double event : {first.lift_off_amplitude, first.reversal_amplitude})
+    if (std::isfinite(event)) last = std::max(last, event);
+  return {0.5 * first_event(first), 8 * last / first_event(first)};
+}
+
+/// The sum of the least stable modes with random phases and amplitudes.
+State random_start(const AttractorProblem& problem, std::mt19937_64& generator)
+{
+  State start = resting(problem.sliding.equilibrium);
+  const auto [least, ratio] = amplitude_range(problem.unstable);
+  for (std::size_t i = 0; i < std::min(random_modes, problem.modes.size()); ++i)
+  {
+    const double amplitude = least * std::pow(ratio, uniform(generator)), phase = two_pi * uniform(generator);
+    State motion = mode_state(problem.sliding.equilibrium, problem.modes[i], amplitude, phase);
+    check(VecAXPY(motion.u, -1, problem.sliding.equilibrium.u));
+    add_motion(motion, 1, start);
+  }
+  return start;
+}
+
+} // namespace
+
+std::vector<NamedStart> make_starts(const AttractorProblem& problem)
+{
+  const Equilibrium& equilibrium = problem.sliding.equilibrium;
+  const auto wanted = static_cast<std::size_t>(problem.settings.starts);
+  std::vector<NamedStart> starts;
+  const auto add = [&](const std::string& name, std::initializer_list<std::size_t> numbers)
+  {
+    if (starts.size() >= wanted) return;
+    State state = resting(equilibrium);
+    for (const std::size_t i : numbers)
+    {
+      const auto motion = estimated_motion(equilibrium, problem.unstable.modes[i], problem.unstable.estimates[i]);
+      if (!motion) return;
+      add_motion(*motion, 1, state);
+    }
+    starts.push_back({name, std::move(state)});
+  };
+  const std::size_t count = problem.unstable.modes.size();
+  for (std::size_t i = 0; i < count; ++i) add(format("mode %zu", i + 1), {i});
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t j = i + 1; j < count; ++j) add(format("modes %zu and %zu", i + 1, j + 1), {i, j});
+  std::mt19937_64 generator(1); // equal runs draw equal starts
+  for (int number = 1; starts.size() < wanted; ++number)
+    starts.push_back({format("random %d", number), random_start(problem, generator)});
+  const double event = first_event(problem.unstable.estimates.front());
+  if (problem.from_small && event > 0 && std::isfinite(event)) // smaller motions come through its state
+    starts.push_back({"growth of mode 1", mode_state(equilibrium, problem.unstable.modes.front(), event / 2, 0)});
+  return starts;
+}
+
+namespace
+{
+
+bool agree(const MeanValue& a, const MeanValue& b, double relative)
+{
+  return std::abs(a.value - b.value) <= a.error + b.error + relative * std::max(std::abs(a.value), std::abs(b.value));
+}
+
+bool same(const ReachedMotion& a, const ReachedMotion& b)
+{
+  if (a.kind != b.kind) return false;
+  return a.kind == ReachedKind::rest || agree(a, b);
+}
+
+} // namespace
+
+MeanValue frequency_of(const std::vector<double>& crossings)
+{
+  const std::size_t count = crossings.size();
+  if (count < 8) return {};
+  const auto between = [&](std::size_t first, std::size_t last)
+  { return static_cast<double>(last - first) / (crossings[last] - crossings[first]); };
+  const std::size_t half = count / 2, quarter = (half + count - 1) / 2;
+  return {between(half, count - 1), std::abs(between(half, quarter) - between(quarter, count - 1))};
+}
+
+bool agree(const ReachedMotion& a, const ReachedMotion& b)
+{
+  return agree(a.energy, b.energy, 0.01) && agree(a.frequency, b.frequency, 1e-3);
+}
+
+bool is_cycle(const ReachedMotion& motion, const MeanValue& energy, const MeanValue& frequency)
+{
+  const double times = std::max(1., std::round(motion.frequency.value / frequency.value));
+  return agree(motion, {motion.kind, energy, {times * frequency.value, times * frequency.error}, {}});
+}
+
+ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<double>& crossings, double rest)
+{
+  constexpr double within = 0.005; // of the mean
+  ReachedMotion reached;
+  if (energies.empty()) return reached;
+  const auto half = std::span(energies).last((energies.size() + 1) / 2);
+  reached.energy = batch_mean(half);
+  reached.frequency = frequency_of(crossings);
+  if (energies.size() < 20)
+  {
+    const auto [least, most] = std::ranges::minmax(half);
+    reached.energy.error = most - least;
+    return reached;
+  }
+  const MeanValue decay = decay_of_spread(half);
+  const double to_a_half = std::log(2.) / static_cast<double>(half.size()); // within the window
+  const bool is_steady = reached.energy.error < within * reached.energy.value;
+  if (energies.back() < rest)
+    reached = {ReachedKind::rest, reached.energy, {}, {}};
+  else if (is_stationary(half) && (is_steady || decay.value <= std::max(decay.error, to_a_half)))
+    reached.kind = is_steady ? ReachedKind::steady : ReachedKind::varying;
+  return reached;
+}
+
+std::vector<ReachedMotion> joined(std::vector<ReachedMotion> motions)
+{
+  std::vector<ReachedMotion> list;
+  for (ReachedMotion& motion : motions)
+  {
+    const auto known =
+        std::find_if(list.begin(), list.end(), [&](const ReachedMotion& other) { return same(motion, other); });
+    if (known == list.end())
+      list.push_back(std::move(motion));
+    else
+      known->starts.insert(known->starts.end(), motion.starts.begin(), motion.starts.end());
+  }
+  std::stable_sort(list.begin(), list.end(),
+                   [](const ReachedMotion& a, const ReachedMotion& b) { return a.starts.size() > b.starts.size(); });
+  return list;
+}
 
 namespace
 {

@@ -1,6 +1,5 @@
 #include "squeal/base/free_memory.hpp"
 
-#include "squeal/base/available_memory.hpp"
 #include "squeal/base/petsc.hpp"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 #include "squeal/branch/continuation.hpp"
 
-#include "events.hpp"
+#include "corrector.hpp"
 
 #include <Eigen/Core>
 

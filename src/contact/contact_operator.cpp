@@ -1,5 +1,4 @@
 #include "squeal/contact/contact_operator.hpp"
-
 #include "near_field.hpp"
 #include "squeal/algebra/panel.hpp"
 #include "squeal/algebra/simd.hpp"
@@ -257,6 +256,151 @@ ContactOperator make_contact_operator(const Factor& factor, double scale, const 
       },
       shares);
   return {std::move(columns), pairs, directions, comm};
+}
+
+namespace
+{
+
+/// Entries that are all different, the same for any number of ranks: a start for inverse iteration.
+Owned<Vec> uneven_vector(Mat A)
+{
+  Owned<Vec> x;
+  check(MatCreateVecs(A, x.put(), nullptr));
+  PetscInt first = 0, last = 0;
+  check(VecGetOwnershipRange(x, &first, &last));
+  for (PetscInt i = first; i < last; ++i)
+    check(VecSetValue(x, i, 1 + 0.5 * std::sin(7. * static_cast<double>(i) + 1), INSERT_VALUES));
+  check(VecAssemblyBegin(x));
+  check(VecAssemblyEnd(x));
+  return x;
+}
+
+/// Inverse iteration: x becomes the motion that A resists least, next to D = diag(A); returns x'A x / x'D x.
+double least_resistance(const Factor& factor, Vec D, Vec x)
+{
+  const auto load = zeros_like(x), scaled = zeros_like(x);
+  double quotient = 1;
+  for (int iteration = 0; iteration < 3; ++iteration)
+  {
+    double size = 0, work = 0, weight = 0;
+    check(VecNorm(x, NORM_INFINITY, &size));
+    if (!std::isfinite(size) || size == 0) return 0;
+    check(VecScale(x, 1 / size));
+    check(VecPointwiseMult(load, D, x));
+    solve(factor, load, x);
+    check(VecPointwiseMult(scaled, D, x));
+    check(VecDot(x, load, &work));
+    check(VecDot(x, scaled, &weight));
+    quotient = work / weight;
+  }
+  return quotient;
+}
+
+PetscInt row_of_largest_entry(Vec x)
+{
+  PetscInt where = 0;
+  double value = 0;
+  const auto size = zeros_like(x);
+  check(VecCopy(x, size));
+  check(VecAbs(size));
+  check(VecMax(size, &where, &value));
+  return where;
+}
+
+/// After a failed factorisation: finds the motion that A resists least, with a little added to A's diagonal. If that
+/// matrix does not factor either, A is indefinite.
+void find_loose(Mat A, Vec D, const FactorOptions& options, Factored& result)
+{
+  double largest = 0, part = 1e-8;
+  check(VecNorm(D, NORM_INFINITY, &largest));
+  const auto x = uneven_vector(A);
+  const auto uniform = zeros_like(D);
+  check(VecSet(uniform, 1));
+  for (bool failed = true; failed && part < 100; part *= 10)
+  {
+    const Owned<Mat> shifted = copy_of(A);
+    check(MatShift(shifted, largest > 0 ? part * largest : 1));
+    const Factor factor(shifted, nullptr, options);
+    failed = factor.failed();
+    if (failed) result.indefinite = true;
+    if (!failed) least_resistance(factor, uniform, x);
+  }
+  result.loose = row_of_largest_entry(x);
+}
+
+} // namespace
+
+Factored factor_positive(Mat A, const Interface& interface, const FactorOptions& options)
+{
+  Factored result;
+  Mat B = interface.pairs > 0 ? interface.B.get() : nullptr;
+  result.factor = Factor(A, B, options);
+  Owned<Vec> D;
+  check(MatCreateVecs(A, D.put(), nullptr));
+  check(MatGetDiagonal(A, D));
+  if (result.factor.failed())
+  {
+    find_loose(A, D, options, result);
+    return result;
+  }
+  // a singular matrix often factors without complaint; rounding leaves it this much resistance and no more
+  const auto x = uneven_vector(A);
+  result.resistance = least_resistance(result.factor, D, x);
+  if (!(result.resistance > 1e-14)) result.loose = row_of_largest_entry(x);
+  return result;
+}
+
+Factor factor_held(Mat A, const Interface& interface, const DofNames& names, const FactorOptions& options)
+{
+  auto [factor, loose, indefinite, resistance] = factor_positive(A, interface, options);
+  if (loose)
+    throw Error((indefinite ? "not positive definite: driven on, not back, is" : "singular: nothing resists") +
+                (" a motion that is largest at " + describe(names, *loose)) + "; give it a support, a spring or mass");
+  return std::move(factor);
+}
+
+namespace
+{
+
+double product(const std::vector<double>& a, const std::vector<double>& b)
+{
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.);
+}
+
+/// B x, without the rows that are not taken.
+std::vector<double> rows_taken(const Interface& interface, const std::vector<char>& taken, Vec x)
+{
+  std::vector<double> rows = relative(interface, x);
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] *= taken[i];
+  return rows;
+}
+
+} // namespace
+
+std::vector<double> forces_on_rows(const Interface& interface, const std::vector<char>& taken, Vec x)
+{
+  constexpr double rounding = 1e-14;
+  constexpr int most_passes = 200;
+  const Owned<Vec> work = zeros_like(x);
+  std::vector<double> residual = rows_taken(interface, taken, x), z(residual.size(), 0.), along = residual;
+  double square = product(residual, residual);
+  const double enough = rounding * rounding * square;
+  for (int pass = 0; square > enough && pass < most_passes; ++pass)
+  {
+    check(VecSet(work, 0));
+    add_reactions(interface, along, work);
+    const std::vector<double> image = rows_taken(interface, taken, work);
+    const double part = square / product(along, image);
+    for (std::size_t i = 0; i < z.size(); ++i)
+    {
+      z[i] += part * along[i];
+      residual[i] -= part * image[i];
+    }
+    const double next = product(residual, residual);
+    for (std::size_t i = 0; i < z.size(); ++i) along[i] = residual[i] + next / square * along[i];
+    square = next;
+  }
+  return z;
 }
 
 } // namespace squeal

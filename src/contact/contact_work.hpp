@@ -1,6 +1,6 @@
 #pragma once
 /// What the contact solvers share: one problem while it is being solved.
-#include "squeal/contact/force_scale.hpp"
+#include "squeal/contact/pair_law.hpp"
 #include "squeal/contact/solver.hpp"
 
 namespace squeal

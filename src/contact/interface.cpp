@@ -3,7 +3,7 @@
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/solid/binary.hpp"
-#include "squeal/solid/sparse_rows.hpp"
+#include "squeal/solid/structure.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 #pragma once
 /// How far a cycle's period and energy spread over the offsets that its joints may keep (src/README.md, section 6.13).
-#include "squeal/cycle/measured_period.hpp"
-#include "squeal/shooting/full_space.hpp"
+#include "squeal/cycle/period_map.hpp"
+#include "squeal/shooting/secants.hpp"
 
 namespace squeal
 {

@@ -6,7 +6,7 @@
 #include "squeal/cycle/preconditioner.hpp"
 #include "step_refinement.hpp"
 
-#include "squeal/shooting/full_space.hpp"
+#include "squeal/shooting/secants.hpp"
 
 #include <algorithm>
 #include <cmath>

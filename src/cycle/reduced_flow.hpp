@@ -1,7 +1,7 @@
 #pragma once
 /// The reduced model as a flow for shooting (src/README.md, sections 7.5 and 7.6). Its monodromy matrix gives the
 /// approximate inverse of a period map's dPhi_T/dx - I.
-#include "squeal/reduction/reduced_tangent.hpp"
+#include "squeal/reduction/reduced_step.hpp"
 #include "squeal/shooting/flow.hpp"
 
 namespace squeal

@@ -4,7 +4,7 @@
 
 #include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/cycle/cycle_checkpoint.hpp"
+#include "squeal/cycle/limit_cycle.hpp"
 
 #include <algorithm>
 #include <cmath>

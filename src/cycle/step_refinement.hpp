@@ -2,7 +2,7 @@
 /// Cycles of the full model near one that is known, at as many steps a period as the accuracy needs (src/README.md,
 /// section 7.8).
 #include "squeal/cycle/fidelity.hpp"
-#include "squeal/shooting/multisecant.hpp"
+#include "squeal/shooting/secants.hpp"
 
 namespace squeal
 {

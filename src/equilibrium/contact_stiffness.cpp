@@ -1,4 +1,4 @@
-#include "squeal/equilibrium/contact_stiffness.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 
 namespace squeal
 {

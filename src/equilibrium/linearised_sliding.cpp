@@ -1,7 +1,6 @@
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
 #include "squeal/algebra/quadratic_residual.hpp"
-#include "squeal/equilibrium/contact_stiffness.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,5 @@
 #include "load_path.hpp"
 
-#include "balance.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/packed.hpp"
 #include "squeal/base/run_control.hpp"

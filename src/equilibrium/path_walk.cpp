@@ -1,6 +1,6 @@
 #include "squeal/equilibrium/path_walk.hpp"
 
-#include "pivoting.hpp"
+#include "load_path.hpp"
 #include "squeal/base/error.hpp"
 
 #include <algorithm>

@@ -1,6 +1,11 @@
-#include "pivoting.hpp"
+#include "load_path.hpp"
+#include "squeal/base/constants.hpp"
+#include "squeal/base/error.hpp"
+#include "squeal/equilibrium/path_walk.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <Eigen/Dense>
 #include <Eigen/QR>
 #include <numeric>
 #include <ranges>
@@ -135,6 +140,209 @@ std::optional<StickSlipState> rest_by_pivoting(const StickSlipOperator& of, cons
     if (auto found = solution_of(of, q, closed)) return found;
   }
   return std::nullopt;
+}
+
+namespace
+{
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Forces that span each pair's cone, columns over its rows. A disc becomes the polygon drawn round it, so that what no
+/// sum of them balances, no friction does.
+MatrixXd generators(const PathProblem& problem, const StickSlipFriction& friction)
+{
+  constexpr int sides = 16;
+  const int directions = problem.of.directions;
+  const PairRows<Index> rows(directions);
+  std::vector<VectorXd> columns;
+  const auto add = [&](std::size_t pair, double first, double second)
+  {
+    VectorXd& column = columns.emplace_back(VectorXd::Zero(problem.of.N.rows()));
+    const Index normal = rows.normal(static_cast<Index>(pair));
+    column[normal] = 1;
+    column[normal + 1] = friction.mu[pair] * first;
+    if (directions > 1) column[normal + 2] = friction.mu[pair] * second;
+  };
+  const TangentView<const double> e(friction.e, directions);
+  for (std::size_t pair = 0; pair < friction.mu.size(); ++pair)
+    if (length(e.of(pair)) > 0)
+      add(pair, e.of(pair)[0], directions > 1 ? e.of(pair)[1] : 0);
+    else if (directions == 1)
+      add(pair, 1, 0), add(pair, -1, 0);
+    else
+      for (int side = 0; side < sides; ++side)
+      {
+        const double angle = two_pi * side / sides, corner = 1 / std::cos(two_pi / 2 / sides); // over the radius
+        add(pair, corner * std::cos(angle), corner * std::sin(angle));
+      }
+  MatrixXd result(problem.of.N.rows(), static_cast<Index>(columns.size()));
+  for (Index i = 0; i < result.cols(); ++i) result.col(i) = columns[static_cast<std::size_t>(i)];
+  return result;
+}
+
+/// A x - b at the x >= 0 that makes it smallest (Lawson and Hanson 1974, algorithm NNLS); of no size where `most`
+/// exchanges do not find it.
+VectorXd least_rest(const MatrixXd& A, const VectorXd& b, Index most)
+{
+  std::vector<Index> passive;
+  VectorXd x = VectorXd::Zero(A.cols()), rest = -b;
+  const double enough = 1e-12 * b.norm() * A.colwise().norm().maxCoeff();
+  for (Index iteration = 0;; ++iteration)
+  {
+    VectorXd gain = -A.transpose() * rest;
+    for (const Index i : passive) gain[i] = 0;
+    Index entering = 0;
+    if (!(gain.maxCoeff(&entering) > enough)) return rest;
+    if (iteration == most) return {};
+    passive.push_back(entering);
+    for (bool feasible = false; !feasible && !passive.empty();)
+    {
+      const VectorXd free = A(Eigen::all, passive).colPivHouseholderQr().solve(b);
+      double part = 1;
+      for (std::size_t k = 0; k < passive.size(); ++k)
+        if (const double to = free[static_cast<Index>(k)], from = x[passive[k]]; to <= 0)
+          part = std::min(part, from / (from - to));
+      for (std::size_t k = 0; k < passive.size(); ++k)
+        x[passive[k]] += part * (free[static_cast<Index>(k)] - x[passive[k]]);
+      feasible = part == 1;
+      std::erase_if(passive, [&](Index i) { return !(x[i] > 1e-15 * x.maxCoeff()); });
+    }
+    rest = A * x - b;
+  }
+}
+
+} // namespace
+
+std::optional<VectorXd> unresisted_motion(const PathProblem& problem, const StickSlipFriction& friction,
+                                          const VectorXd& q)
+{
+  // rows that move without strain, N b = 0: what drives them by the load, kappa b'q, has to be balanced by b'r
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> spectrum(problem.of.N);
+  const VectorXd stiffness = spectrum.eigenvalues().cwiseAbs();
+  const Index free = (stiffness.array() <= 1e-9 * stiffness.maxCoeff()).count();
+  if (free == 0) return std::nullopt;
+  const MatrixXd rigid = spectrum.eigenvectors().leftCols(free);
+  const VectorXd drive = -problem.kappa * (rigid.transpose() * q);
+  if (drive.norm() <= 1e-12 * problem.kappa * q.norm()) return std::nullopt;
+  const MatrixXd forces = rigid.transpose() * generators(problem, friction);
+  const VectorXd rest = least_rest(forces, drive, 3 * forces.cols());
+  if (rest.norm() <= 1e-9 * drive.norm()) return std::nullopt;
+  return rigid * rest;
+}
+
+bool has_no_solution(const StickSlipOperator& of, const VectorXd& q)
+{
+  constexpr Index most = 300;     // exchanges, beyond which the proof would take longer than the search
+  constexpr double surely = 1e-7; // of the right side
+  MatrixXd both(q.size(), 2 * q.size());
+  both << of.N, -of.M / of.compliance;
+  return least_rest(both, q, most).norm() > surely * q.norm();
+}
+
+bool has_one_solution(const StickSlipOperator& of)
+{
+  return of.N.isIdentity(0) && Eigen::LLT<MatrixXd>((of.M + of.M.transpose()) / 2).info() == Eigen::Success;
+}
+
+namespace
+{
+
+/// Any kappa is exact; one of the size of the structure's own stiffness keeps the digits.
+double typical_stiffness(Mat K)
+{
+  Owned<Vec> diagonal;
+  check(MatCreateVecs(K, diagonal.put(), nullptr));
+  check(MatGetDiagonal(K, diagonal));
+  double largest = 0;
+  check(VecNorm(diagonal, NORM_INFINITY, &largest));
+  return largest > 0 ? largest : 1;
+}
+
+/// K with springs kappa across these rows, and its factor.
+Factored add_springs(const Structure& structure, const Interface& interface, Mat rows, const FactorOptions& options,
+                     Held& held)
+{
+  check(MatTransposeMatMult(rows, rows, MAT_INITIAL_MATRIX, PETSC_DEFAULT, held.augmented.put()));
+  check(MatScale(held.augmented, held.kappa)); // K added to these saves a copy of K
+  check(MatAXPY(held.augmented, 1, structure.K, DIFFERENT_NONZERO_PATTERN));
+  check(MatSetOption(held.augmented, MAT_SYMMETRIC, PETSC_TRUE));
+  return factor_positive(held.augmented, interface, options);
+}
+
+[[noreturn]] void throw_loose(const Structure& structure, PetscInt loose)
+{
+  throw Error("equilibrium: the stiffness is singular: neither supports, springs nor contact hold " +
+              describe(structure.names, loose) + "; give it a support or a spring");
+}
+
+} // namespace
+
+Held hold(const Structure& structure, const Interface& interface, const FactorOptions& options)
+{
+  // Springs this soft beside the rest lose the digits of the reactions, which contact would hold.
+  constexpr double soft = 1e-10;
+  Factored own = factor_positive(structure.K, interface, options);
+  Held held;
+  if (interface.pairs > 0 && (own.loose || own.resistance < soft))
+  {
+    own.factor = Factor(); // two of them side by side would be the most that a run ever holds
+    held.kappa = typical_stiffness(structure.K);
+    std::vector<int> all(static_cast<std::size_t>(interface.pairs));
+    std::iota(all.begin(), all.end(), 0);
+    Factored with_contact =
+        add_springs(structure, interface, rows_of(interface, all, RowsTaken::normal), options, held);
+    if (!with_contact.loose && (own.loose || with_contact.resistance > 10 * own.resistance))
+    {
+      held.factor = std::move(with_contact.factor);
+      return held;
+    }
+    held = {};
+    with_contact.factor = Factor();
+    if (!own.loose) own = factor_positive(structure.K, interface, options);
+    if (own.loose && with_contact.loose)
+    {
+      own.loose = with_contact.loose;
+      own.indefinite = with_contact.indefinite;
+    }
+  }
+  if (own.loose && own.indefinite)
+    throw Error("equilibrium: the stiffness is not positive definite: a motion that is largest at " +
+                describe(structure.names, *own.loose) +
+                " is driven on, not back, and the structure diverges (buckles) from any rest; look for a stiffness of "
+                "the wrong sign, or a load beyond the critical one");
+  if (own.loose) throw_loose(structure, *own.loose);
+  held.factor = std::move(own.factor);
+  return held;
+}
+
+Held hold_by_all_rows(const Structure& structure, const Interface& interface, const FactorOptions& options)
+{
+  constexpr double part = 1e-2; // of the structure's stiffness: long chains of bodies lose digits by more
+  Held held;
+  held.kappa = part * typical_stiffness(structure.K);
+  Factored factored = add_springs(structure, interface, interface.B, options, held);
+  if (factored.loose) throw_loose(structure, *factored.loose);
+  held.factor = std::move(factored.factor);
+  return held;
+}
+
+bool balances(const Structure& structure, const Interface& interface, Equilibrium& equilibrium)
+{
+  const auto residual = zeros_like(structure.load);
+  double load = 0, stress = 0, defect = 0, stiffness = 0, motion = 0;
+  check(MatMult(structure.K, equilibrium.u, residual));
+  check(VecNorm(residual, NORM_2, &stress));
+  check(VecScale(residual, -1));
+  check(VecAXPY(residual, 1, structure.load));
+  if (interface.pairs > 0) add_reactions(interface, equilibrium.reactions, residual);
+  check(VecNorm(residual, NORM_2, &defect));
+  check(VecNorm(structure.load, NORM_2, &load));
+  check(VecNorm(equilibrium.u, NORM_2, &motion));
+  check(MatNorm(structure.K, NORM_INFINITY, &stiffness));
+  equilibrium.force_residual = defect == 0 ? 0 : defect / (load > 0 ? load : stress);
+  return equilibrium.force_residual <= 1e-9 || defect <= 4 * PETSC_MACHINE_EPSILON * stiffness * motion;
 }
 
 } // namespace squeal

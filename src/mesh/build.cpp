@@ -6,7 +6,6 @@
 
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/shape_functions.hpp"
-#include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>
 #include <map>
@@ -268,7 +267,7 @@ void check_doubles(const Mesh& mesh, const Scene& scene)
 }
 
 /// The edges of a solid between two corners, each with its mid-side node or -1. Mid-sides on edges of shells follow
-/// them (squeal/mesh/ties.hpp).
+/// them (squeal/mesh/contact_pairs.hpp).
 std::vector<std::array<int, 3>> edges_of(const Element& element)
 {
   std::vector<std::array<int, 3>> edges;

@@ -1,7 +1,7 @@
-#include "dual_rows.hpp"
+#include "face_overlap.hpp"
 
 #include "squeal/base/error.hpp"
-#include "squeal/mesh/shapes.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <algorithm>
 #include <boost/geometry.hpp>

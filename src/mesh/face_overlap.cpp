@@ -5,8 +5,7 @@
 /// Caveat: polygons join corners, so sides that are curved in the plane are taken as straight.
 #include "face_overlap.hpp"
 
-#include "squeal/mesh/quadrature.hpp"
-#include "squeal/mesh/shapes.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <algorithm>
 #include <cmath>

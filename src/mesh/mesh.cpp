@@ -10,7 +10,7 @@
 #include "squeal/mesh/frames.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/row_motions.hpp"
-#include "squeal/mesh/shapes.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <algorithm>
 #include <array>

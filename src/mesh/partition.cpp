@@ -8,7 +8,7 @@
 #include "squeal/base/disjoint_sets.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/mesh/shapes.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <algorithm>
 #include <metis.h>

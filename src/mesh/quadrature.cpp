@@ -2,7 +2,7 @@
 ///
 /// Reference elements: xi_k in [-1, 1] of boxes; xi_k >= 0, sum xi_k <= 1 of simplices; their product of wedges.
 /// Collapsed rules are conical products (Stroud 1971): x = a, y = b (1 - a), z = c (1 - a)(1 - b), a b c in [0, 1].
-#include "squeal/mesh/quadrature.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <cmath>
 #include <map>

@@ -12,7 +12,6 @@
 #include "squeal/base/free_memory.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/shape_functions.hpp"
-#include "squeal/mesh/shapes.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -7,9 +7,7 @@
 ///     on wedges    of degree 1 in the triangle and along it
 /// The factors of the products are multiples of 1/8, hence exact.
 /// Caveat: the mid-side nodes of gmsh are not in the order of Abaqus or VTK.
-#include "squeal/mesh/shapes.hpp"
-
-#include "squeal/mesh/quadrature.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <algorithm>
 

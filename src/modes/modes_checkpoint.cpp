@@ -1,7 +1,7 @@
-#include "squeal/modes/modes_checkpoint.hpp"
+#include "squeal/modes/modes.hpp"
 
 #include "squeal/base/checkpoint.hpp"
-#include "squeal/equilibrium/file_order.hpp"
+#include "squeal/equilibrium/state.hpp"
 
 #include <cstdio>
 

@@ -1,6 +1,6 @@
 #include "squeal/modes/real_modes.hpp"
 
-#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"

@@ -1,11 +1,11 @@
 /// The reduced period map's derivative (src/README.md, sections 4.13 and 7.5) along recorded contact. With x = (v, q),
 /// b x the changes of the rows of contact and dr = Q y their reactions (transient/linear_contact.hpp), a step is
 ///     v+ = F x + P Q y,     q+ = q + h (theta v+ + (1-theta) v).
-#include "squeal/reduction/reduced_tangent.hpp"
+#include "squeal/reduction/reduced_step.hpp"
 
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/contact/sliding_direction.hpp"
+#include "squeal/contact/interface.hpp"
 #include "squeal/transient/linear_contact.hpp"
 
 #include <algorithm>

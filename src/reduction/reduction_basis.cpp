@@ -1,11 +1,11 @@
 #include "reduction_basis.hpp"
 
-#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/reduction/sliding_basis.hpp"
-#include "squeal/solid/sparse_rows.hpp"
+#include "squeal/solid/structure.hpp"
 
 #include <algorithm>
 #include <cmath>

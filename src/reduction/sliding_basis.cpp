@@ -1,8 +1,7 @@
 #include "squeal/reduction/sliding_basis.hpp"
 
 #include "squeal/base/petsc.hpp"
-#include "squeal/equilibrium/contact_stiffness.hpp"
-#include "squeal/modes/dense_losses.hpp"
+#include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
 
 #include <algorithm>

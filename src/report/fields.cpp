@@ -4,9 +4,9 @@
 /// Without a cycle it has one grid. XDMF lists an element as its code and then its nodes, in VTK's order.
 #include "files.hpp"
 #include "squeal/base/whole_file.hpp"
-#include "squeal/mesh/shapes.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 #include "squeal/report/results_folder.hpp"
-#include "squeal/solid/sparse_rows.hpp"
+#include "squeal/solid/structure.hpp"
 
 #include <algorithm>
 #include <cmath>

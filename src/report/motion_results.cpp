@@ -1,5 +1,5 @@
 /// Results of motions in time: the transient, and the search for what vibrates.
-#include "results.hpp"
+#include "result.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 #include "files.hpp"
-#include "results.hpp"
+#include "result.hpp"
 #include "squeal/base/whole_file.hpp"
 #include "squeal/report/results_folder.hpp"
 

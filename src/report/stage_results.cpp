@@ -1,5 +1,5 @@
 /// Results of equilibrium, modes and estimate.
-#include "results.hpp"
+#include "result.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 /// Results of responses, branches and sensitivities.
-#include "results.hpp"
+#include "result.hpp"
 #include "squeal/base/constants.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 /// Results of sweeps and of random samples.
-#include "results.hpp"
+#include "result.hpp"
 #include "squeal/scene/numbers.hpp"
 
 #include <algorithm>

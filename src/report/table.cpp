@@ -1,5 +1,5 @@
 /// The table a person reads at the end of a run: the answer, rows for each stage, and the next command.
-#include "results.hpp"
+#include "result.hpp"
 
 #include <cctype>
 #include <cmath>

@@ -1,10 +1,9 @@
 #include "squeal/shooting/multipliers.hpp"
 
-#include "oblique_projector.hpp"
+#include "monodromy.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/cost.hpp"
 #include "squeal/base/progress.hpp"
-#include "whole_matrix.hpp"
 
 #include <algorithm>
 #include <cmath>

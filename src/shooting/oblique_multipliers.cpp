@@ -6,7 +6,7 @@
 /// 1975). The largest Ritz values of A beside V = Q y, and beside what A_r knows, are sought in a block Arnoldi space.
 /// Where they are below 1 by more than their residuals, no larger multiplier is to be expected. That is likely, not
 /// proven.
-#include "deflated_search.hpp"
+#include "monodromy.hpp"
 #include "squeal/base/cost.hpp"
 
 #include <algorithm>

@@ -1,10 +1,9 @@
 #include "squeal/shooting/shooting.hpp"
 
 #include "beside_orbit.hpp"
-#include "free_periods.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/cost.hpp"
-#include "squeal/shooting/full_space.hpp"
+#include "squeal/shooting/secants.hpp"
 #include "subspace_newton.hpp"
 
 #include <algorithm>

@@ -7,7 +7,7 @@
 /// seven unknowns, all on rank 0. Newton is SNES's; GMRES solves for its steps by columns of the exact tangent.
 ///
 /// Caveat: a solution of the projected equations leaves a defect outside the subspace, which need not be small.
-#include "squeal/shooting/options.hpp"
+#include "squeal/shooting/multipliers.hpp"
 #include "squeal/shooting/orbit.hpp"
 
 namespace squeal

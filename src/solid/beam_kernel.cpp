@@ -6,7 +6,7 @@
 #include "kernels.hpp"
 
 #include "squeal/base/constants.hpp"
-#include "squeal/mesh/quadrature.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <array>
 #include <cmath>

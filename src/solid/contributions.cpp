@@ -5,7 +5,7 @@
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/mesh/frames.hpp"
-#include "squeal/mesh/shapes.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 #include "squeal/solid/binary.hpp"
 
 #include <algorithm>

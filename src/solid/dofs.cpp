@@ -1,7 +1,7 @@
 /// Free degrees of freedom q and the constraints u = T q on the nodal degrees of freedom u.
 ///
 /// Rigid body:       u = u_ref + theta x (x - x_ref); the rotations of a shell node are theta.
-/// Tie:              a slave node follows nodes of the master (squeal/mesh/ties.hpp).
+/// Tie:              a slave node follows nodes of the master (squeal/mesh/contact_pairs.hpp).
 /// Coupling, joint, support in a frame: rows of their own (constraints.hpp).
 /// Shell on a solid: a node of both rotates with the solid nodes around it, those of the solid elements that hold it,
 /// by
@@ -12,8 +12,8 @@
 #include "squeal/solid/dofs.hpp"
 
 #include "constraints.hpp"
-#include "squeal/mesh/shapes.hpp"
-#include "squeal/mesh/ties.hpp"
+#include "squeal/mesh/contact_pairs.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 #include "squeal/solid/element.hpp"
 
 #include <algorithm>

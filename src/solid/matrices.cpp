@@ -1,7 +1,7 @@
 /// Structures given as matrices: M C K G H F of a folder, in PETSc's binary format.
 #include "squeal/solid/structure.hpp"
 
-#include "squeal/algebra/pencil_factor.hpp"
+#include "squeal/algebra/shift_invert.hpp"
 #include "squeal/solid/binary.hpp"
 
 #include <cmath>

@@ -33,7 +33,7 @@
 ///     a_k = -3 / (2 L (1 + phi_k)) (w_j - w_i + L/2 t . (beta_i + beta_j)).
 /// The shear strain is the field with the constant tangential value gamma_k on each side (edge functions).
 #include "kernels.hpp"
-#include "squeal/mesh/quadrature.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <cmath>
 

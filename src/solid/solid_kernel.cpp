@@ -14,8 +14,7 @@
 /// filling, not for beams. tet4 has constant strains and is stiff in all bending. hex8 is exact in bending as a
 /// parallelepiped and stiffer when tapered (MacNeal 1987), as all 8-node bricks are.
 #include "kernels.hpp"
-#include "squeal/mesh/quadrature.hpp"
-#include "squeal/mesh/shapes.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <Eigen/LU>
 

@@ -1,4 +1,4 @@
-#include "squeal/solid/sparse_rows.hpp"
+#include "squeal/solid/structure.hpp"
 
 #include <algorithm>
 #include <cmath>

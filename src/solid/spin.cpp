@@ -4,8 +4,8 @@
 /// whatever the mesh, since sigma balances that force on the same functions and points.
 #include "contributions.hpp"
 
-#include "squeal/algebra/pencil_factor.hpp"
-#include "squeal/mesh/shapes.hpp"
+#include "squeal/algebra/shift_invert.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 #include "squeal/solid/element.hpp"
 
 #include <algorithm>

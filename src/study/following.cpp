@@ -1,6 +1,5 @@
-#include "following.hpp"
+#include "point_modes.hpp"
 
-#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 
 #include <algorithm>

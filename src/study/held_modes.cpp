@@ -1,6 +1,6 @@
 #include "held_modes.hpp"
 
-#include "squeal/modes/dense_losses.hpp"
+#include "squeal/modes/quadratic.hpp"
 #include "squeal/reduction/sliding_basis.hpp"
 
 #include <algorithm>

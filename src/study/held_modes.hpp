@@ -1,7 +1,7 @@
 #pragma once
 /// Unstable modes with right and left vectors, and what a model makes of them while they are held (src/README.md,
 /// section 11.1). Every function is collective.
-#include "squeal/modes/two_sided.hpp"
+#include "squeal/modes/passes.hpp"
 #include "squeal/study/sensitivity.hpp"
 
 namespace squeal

@@ -1,6 +1,5 @@
 #include "point_modes.hpp"
 
-#include "squeal/algebra/dense_eigenproblems.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/modes/real_modes.hpp"

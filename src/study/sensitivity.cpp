@@ -1,7 +1,7 @@
 #include "squeal/study/sensitivity.hpp"
 
 #include "held_modes.hpp"
-#include "squeal/modes/dense_losses.hpp"
+#include "squeal/modes/quadratic.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 /// (src/README.md, sections 10.1 to 10.5).
 #include "squeal/study/sweep.hpp"
 
-#include "following.hpp"
+#include "point_modes.hpp"
 #include "squeal/base/cost.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"

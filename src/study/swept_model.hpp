@@ -1,7 +1,7 @@
 #pragma once
 /// The model at the points of a sweep, with what they share: its matrices, the compliance of its pairs and the basis of
 /// its modes.
-#include "following.hpp"
+#include "point_modes.hpp"
 
 #include <functional>
 #include <map>

@@ -1,4 +1,4 @@
-#include "following.hpp"
+#include "point_modes.hpp"
 
 #include "squeal/algebra/root.hpp"
 

@@ -2,7 +2,7 @@
 
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/contact/sliding_direction.hpp"
+#include "squeal/contact/interface.hpp"
 
 #include <algorithm>
 #include <string>

@@ -100,7 +100,7 @@ def test_shooting_knows_no_brake():
 
 def test_continuation_knows_no_brake():
     """Nor does the tracing of a branch: it sees a family of flows."""
-    generic = {"continuation.hpp", "continuation.cpp", "corrector.hpp", "corrector.cpp", "events.hpp", "events.cpp"}
+    generic = {"continuation.hpp", "continuation.cpp", "corrector.hpp", "corrector.cpp"}
     files, includes = includes_of("branch")
     assert generic <= {file.name for file in files}
     assert {target for name, target in includes if name in generic} <= {"base", "shooting", "branch"}

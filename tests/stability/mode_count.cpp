@@ -1,7 +1,7 @@
 // Where eigenvalues crowd, a pair moves like the square root of a change.
-#include "../support/flutter_chain.hpp"
+#include "flutter_chain.hpp"
 #include "squeal/algebra/shift_invert.hpp"
-#include "squeal/modes/pair_search.hpp"
+#include "squeal/modes/modes.hpp"
 #include "squeal/modes/real_modes.hpp"
 
 #include <algorithm>

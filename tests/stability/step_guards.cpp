@@ -1,7 +1,6 @@
 // Where theta and the step size make growth rates wrong: the boundary from both sides, and the refusals that guard it.
-#include "../support/oscillator_mode.hpp"
+#include "oscillator_mode.hpp"
 #include "squeal/base/constants.hpp"
-#include "squeal/transient/growth.hpp"
 #include "squeal/transient/transient.hpp"
 
 #include <cmath>

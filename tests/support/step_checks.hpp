@@ -1,7 +1,7 @@
 #pragma once
 /// Checks of steps that hold for any law and any part of the matrices.
 #include "oscillator_mode.hpp"
-#include "squeal/transient/step_tangent.hpp"
+#include "squeal/transient/theta_step.hpp"
 
 namespace squeal::test
 {

@@ -1,7 +1,7 @@
 // ranks: 1 2 3 4
-#include "../support/option.hpp"
-#include "../support/small_models.hpp"
-#include "squeal/contact/condensed.hpp"
+#include "option.hpp"
+#include "small_models.hpp"
+#include "squeal/contact/contact_operator.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,5 +1,5 @@
 // ranks: 1
-#include "../support/contact_problem.hpp"
+#include "contact_problem.hpp"
 
 #include <algorithm>
 #include <cmath>

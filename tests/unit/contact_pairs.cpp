@@ -1,5 +1,5 @@
 // ranks: 1
-#include "squeal/contact/sliding_direction.hpp"
+#include "squeal/contact/interface.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

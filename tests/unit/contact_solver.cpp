@@ -1,4 +1,4 @@
-#include "../support/contact_problem.hpp"
+#include "contact_problem.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // Multipliers by oblique projection against the whole monodromy matrix, on random frictional oscillators.
 // ranks: 1 2
-#include "../../src/shooting/beside_orbit.hpp"
-#include "../support/cycle_of.hpp"
-#include "squeal/algebra/dense_eigenproblems.hpp"
+#include "beside_orbit.hpp"
+#include "cycle_of.hpp"
+#include "squeal/algebra/dense_matrix.hpp"
 
 #include <algorithm>
 #include <doctest/doctest.h>

@@ -1,7 +1,7 @@
 // ranks: 1 2 3
-#include "../support/blocks.hpp"
+#include "blocks.hpp"
 #include "squeal/mesh/mesh_file.hpp"
-#include "squeal/mesh/shapes.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <doctest/doctest.h>
 #include <numeric>

@@ -1,6 +1,6 @@
 // ranks: 1 2 3
-#include "squeal/algebra/paired_matrices.hpp"
 #include "squeal/algebra/multivector.hpp"
+#include "squeal/algebra/sparse_matrices.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

@@ -1,10 +1,9 @@
 // ranks: 1 2
 // Division of meshes: every element fills its parent, neighbours agree, groups and surfaces are carried over.
-#include "../support/blocks.hpp"
+#include "blocks.hpp"
 #include "squeal/mesh/contact_pairs.hpp"
 #include "squeal/mesh/mesh_file.hpp"
-#include "squeal/mesh/quadrature.hpp"
-#include "squeal/mesh/shapes.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <doctest/doctest.h>
 #include <numeric>

@@ -1,9 +1,8 @@
 // The parts of the shooting solver, each by itself, on smooth oscillators.
-#include "../support/smooth_flows.hpp"
+#include "smooth_flows.hpp"
 #include "squeal/base/constants.hpp"
-#include "squeal/shooting/full_space.hpp"
 #include "squeal/shooting/multipliers.hpp"
-#include "squeal/shooting/multisecant.hpp"
+#include "squeal/shooting/secants.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

@@ -1,10 +1,10 @@
 // ranks: 1 2 3
 // Assembly and constraints by their exact invariants: rigid motions, masses and inertias, point models, resultants.
 // Tolerances are round-off of sums of some thousand terms unless said otherwise.
-#include "../support/approx.hpp"
-#include "../support/bricks.hpp"
-#include "squeal/solid/matrix_rows.hpp"
-#include "squeal/solid/sparse_rows.hpp"
+#include "squeal/solid/structure.hpp"
+#include "approx.hpp"
+#include "bricks.hpp"
+#include "squeal/solid/binary.hpp"
 
 #include <algorithm>
 #include <doctest/doctest.h>

@@ -1,7 +1,7 @@
 // What a sweep is made of: zeros in brackets, eigenvalues with both vectors and with losses, thresholds of modes.
-#include "../../src/study/following.hpp"
+#include "../../src/study/point_modes.hpp"
 #include "squeal/algebra/root.hpp"
-#include "squeal/modes/dense_losses.hpp"
+#include "squeal/modes/quadratic.hpp"
 
 #include <algorithm>
 #include <cmath>

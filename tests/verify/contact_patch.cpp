@@ -2,7 +2,7 @@
 // Contact of meshes that do not match: what the rows of B must do on flat surfaces, whatever the faces.
 #include "small_fem.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
-#include "squeal/mesh/shapes.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <numbers>
 

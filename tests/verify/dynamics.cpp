@@ -1,9 +1,8 @@
 // ranks: 1 2 3
 // Exact-contact dynamics against exact answers, on models small enough to have them.
-#include "../support/approx.hpp"
-#include "../support/oscillator_mode.hpp"
+#include "approx.hpp"
+#include "oscillator_mode.hpp"
 #include "squeal/base/constants.hpp"
-#include "squeal/transient/growth.hpp"
 #include "squeal/transient/transient.hpp"
 
 #include <cmath>

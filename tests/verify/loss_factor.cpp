@@ -1,8 +1,8 @@
 // ranks: 1 2
 // Modes with loss factors: those of complex stiffness. With one eta everywhere they are i w sqrt(1 + i eta), w the
 // undamped frequency. With several eta the problem is solved dense.
-#include "../support/linearised.hpp"
-#include "squeal/solid/sparse_rows.hpp"
+#include "linearised.hpp"
+#include "squeal/solid/structure.hpp"
 
 #include <algorithm>
 #include <cmath>

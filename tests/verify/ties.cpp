@@ -1,7 +1,7 @@
 // ranks: 1 2 3
 // Ties of bricks meshed 3:2: rigid motions without strain, constant stress without force, all of the mass.
-#include "squeal/mesh/ties.hpp"
-#include "../support/bricks.hpp"
+#include "bricks.hpp"
+#include "squeal/mesh/contact_pairs.hpp"
 
 #include <doctest/doctest.h>
 

@@ -11,9 +11,11 @@
 /// with W after the sweeps, so that each such round can gain a factor of a hundred.
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/base/petsc.hpp"
+#include "squeal/contact/interface.hpp"
 #include "squeal/contact/pair_law.hpp"
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -124,5 +126,31 @@ ContactOperator make_contact_operator(std::vector<double> W, int pairs, int dire
 /// scale B A^-1 B' of the factor of A bordered by B, with `added` on its diagonal, unless that is empty. Collective.
 ContactOperator make_contact_operator(const Factor& factor, double scale, const std::vector<double>& added, int pairs,
                                       int directions, MPI_Comm comm);
+
+// The factor of a matrix A bordered by the rows B of the pairs. The condensed contact operator W = scale B A^-1 B'
+// comes from it (src/README.md, sections 4.4 and 8.4).
+
+/// A factored, bordered by the interface's B. Collective.
+/// Error: A singular, naming (`describe`) the offending degree of freedom by the names of rank 0 of A's ranks.
+Factor factor_held(Mat A, const Interface& interface, const DofNames& names, const FactorOptions& options);
+
+/// A symmetric matrix A, bordered by the interface's B, and whether it is positive definite.
+struct Factored
+{
+  Factor factor; // of no use where `loose` is set
+  /// The degree of freedom that moves most in a motion x whose resistance is below rounding; none: A is definite.
+  std::optional<PetscInt> loose;
+  bool indefinite = false; // in that motion x'A x < 0
+  double resistance = 0;   // x'A x / x' diag(A) x, the least that inverse iteration found
+};
+
+/// Factors A bordered by B, after inverse iteration where A is not definite. Collective. Error: memory runs out.
+Factored factor_positive(Mat A, const Interface& interface, const FactorOptions& options);
+
+// Forces on rows of the pairs by what they do to the structure.
+
+/// z with B'z nearest to x, on the rows that are taken (of as many entries as a contact vector), 0 on others.
+/// Conjugate gradients on B B': pairs that share no node are independent of each other. Collective.
+std::vector<double> forces_on_rows(const Interface& interface, const std::vector<char>& taken, Vec x);
 
 } // namespace squeal

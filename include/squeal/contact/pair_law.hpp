@@ -1,21 +1,7 @@
 #pragma once
-/// Signorini-Coulomb contact of one pair (src/README.md, sections 1.3 and 4.5):
-///     0 <= w_n _|_ r_n >= 0,   |r_t| <= mu r_n,   w_t = -sigma r_t with sigma >= 0 (zero while |r_t| < mu r_n),
-/// w_n the gap or its rate, w_t the velocity that friction opposes, mu = mu(|w_t|).
-///
-/// The local problem holds all other pairs: find r with w = A r + q, A the pair's own block of W, symmetric and
-/// positive semi-definite. It is solved to round-off by cases. Open: q_n >= 0. Stick: A r = -q. Slip: r_t = mu r_n d
-/// with a unit d. Then w_n = 0 gives r_n = -q_n / (A_nn + mu A_nt d), and d is a zero of the cross product of d and
-/// w_t. That is a trigonometric polynomial of degree two in the angle of d (Bonnefon and Daviet 2011). Newton starts
-/// from the last direction; the circle is scanned when that fails.
-///
-/// Where mu depends on the speed, stick is accepted by mu(0). Slip has the speed v with |w_t| = v at mu(v), which is
-/// unique while |mu'| r_n A_tt < 1. In a step w_t is s_theta/theta: `law_of_step` takes mu at s_theta.
-///
-/// In a direction in which neither side can move (a zero row of W), r_t opposes the drive while the pair slides along
-/// it. It moves nothing there. At rest there, r_t is zero along it.
-#include "squeal/contact/pair_friction.hpp"
+/// The friction laws of an interface's pairs: one that they share, and those of contacts that have their own.
 #include "squeal/contact/pairs.hpp"
+#include "squeal/mesh/contact_pairs.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -23,6 +9,121 @@
 
 namespace squeal
 {
+
+/// mu and its derivative in the sliding speed.
+struct FrictionCoefficient
+{
+  double value;      // [-]
+  double derivative; // [s/m]
+};
+
+/// A law for each pair.
+struct PairFriction
+{
+  FrictionLaw common;               // of pairs whose contact has none of its own
+  std::vector<FrictionLaw> own{};   // of contacts
+  std::vector<int> number_of_own{}; // of each pair's law in `own`, -1: the common one; empty: all have that
+  std::vector<int> contact{};       // of each pair, among which forces are compared; empty: all are of one
+
+  PairFriction() = default;
+  PairFriction(const FrictionLaw& law) : common(law) {} // of all pairs
+
+  bool has_own(std::size_t pair) const { return !number_of_own.empty() && number_of_own[pair] >= 0; }
+
+  std::size_t contact_of(std::size_t pair) const
+  {
+    return contact.empty() ? 0 : static_cast<std::size_t>(contact[pair]);
+  }
+
+  const FrictionLaw& of(std::size_t pair) const
+  {
+    return has_own(pair) ? own[static_cast<std::size_t>(number_of_own[pair])] : common;
+  }
+};
+
+/// The largest size(pair) of each contact, or a small part of the largest of all: beside it, rounding of the others
+/// stays below tolerances. `contact`: of each pair; empty: all are of one.
+template <class Size>
+std::vector<double> largest_of_contacts(const std::vector<int>& contact, std::size_t pairs, const Size& size)
+{
+  constexpr double small = 1e-4;
+  std::vector<double> largest(1);
+  double all = 0;
+  for (std::size_t pair = 0; pair < pairs; ++pair)
+  {
+    const std::size_t own = contact.empty() ? 0 : static_cast<std::size_t>(contact[pair]);
+    if (own >= largest.size()) largest.resize(own + 1);
+    largest[own] = std::max(largest[own], size(pair));
+    all = std::max(all, largest[own]);
+  }
+  for (double& of_contact : largest) of_contact = std::max(of_contact, small * all);
+  return largest;
+}
+
+/// With every law changed.
+template <class Change> PairFriction changed(PairFriction friction, const Change& change)
+{
+  change(friction.common);
+  for (FrictionLaw& law : friction.own) change(law);
+  return friction;
+}
+
+/// Whether a law of them changes with the sliding speed.
+inline bool depends_on_speed(const PairFriction& friction)
+{
+  return depends_on_speed(friction.common) ||
+         std::ranges::any_of(friction.own, [](const FrictionLaw& law) { return depends_on_speed(law); });
+}
+
+/// The laws of the scene's contacts, by their pairs.
+inline PairFriction friction_of_pairs(const Scene& scene, const std::vector<ContactPair>& pairs)
+{
+  PairFriction friction(scene.friction);
+  if (scene.contacts.size() > 1)
+    for (const ContactPair& pair : pairs) friction.contact.push_back(pair.contact);
+  if (std::ranges::none_of(scene.contacts, [](const Contact& contact) { return contact.friction.has_value(); }))
+    return friction;
+  std::vector<int> number_of_contact;
+  for (const Contact& contact : scene.contacts)
+  {
+    number_of_contact.push_back(contact.friction ? static_cast<int>(friction.own.size()) : -1);
+    if (!contact.friction) continue;
+    friction.own.push_back(*contact.friction);
+    friction.own.back().direction_damping = scene.friction.direction_damping;
+  }
+  for (const ContactPair& pair : pairs)
+    friction.number_of_own.push_back(number_of_contact[static_cast<std::size_t>(pair.contact)]);
+  return friction;
+}
+
+/// The laws of some of the pairs.
+inline PairFriction friction_of_some(PairFriction friction, const std::vector<int>& pairs)
+{
+  for (std::vector<int>* const numbers : {&friction.number_of_own, &friction.contact})
+  {
+    if (numbers->empty()) continue;
+    std::vector<int> some;
+    for (const int pair : pairs) some.push_back((*numbers)[static_cast<std::size_t>(pair)]);
+    *numbers = std::move(some);
+  }
+  return friction;
+}
+
+// Signorini-Coulomb contact of one pair (src/README.md, sections 1.3 and 4.5):
+//     0 <= w_n _|_ r_n >= 0,   |r_t| <= mu r_n,   w_t = -sigma r_t with sigma >= 0 (zero while |r_t| < mu r_n),
+// w_n the gap or its rate, w_t the velocity that friction opposes, mu = mu(|w_t|).
+//
+// The local problem holds all other pairs: find r with w = A r + q, A the pair's own block of W, symmetric and
+// positive semi-definite. It is solved to round-off by cases. Open: q_n >= 0. Stick: A r = -q. Slip: r_t = mu r_n d
+// with a unit d. Then w_n = 0 gives r_n = -q_n / (A_nn + mu A_nt d), and d is a zero of the cross product of d and
+// w_t. That is a trigonometric polynomial of degree two in the angle of d (Bonnefon and Daviet 2011). Newton starts
+// from the last direction; the circle is scanned when that fails.
+//
+// Where mu depends on the speed, stick is accepted by mu(0). Slip has the speed v with |w_t| = v at mu(v), which is
+// unique while |mu'| r_n A_tt < 1. In a step w_t is s_theta/theta: `law_of_step` takes mu at s_theta.
+//
+// In a direction in which neither side can move (a zero row of W), r_t opposes the drive while the pair slides along
+// it. It moves nothing there. At rest there, r_t is zero along it.
 
 /// Without the guard of std::hypot against squares out of range, which takes ten times as long: reactions and
 /// velocities never have such squares.
@@ -185,6 +286,17 @@ struct CompliantGap
 inline CompliantGap compliant_gap(double c, double theta, double h)
 {
   return {1 / (theta * theta * h), (1 - theta) / theta, c / (theta * theta * h)};
+}
+
+// What residuals of contact are compared with (src/README.md, section 4.6). Arithmetic of one rank.
+
+/// The force that a pair's natural map is compared with [N]: the largest reaction, of its contact or of all, or where
+/// it is smaller the force that would give the pair the largest free velocity `speed`. A light pair beside heavy ones
+/// is then not passed over.
+inline double force_scale(const NaturalScale& rho, double speed, double largest_reaction)
+{
+  const double own = speed * std::min(rho.normal, rho.tangential);
+  return own == 0 ? largest_reaction : largest_reaction == 0 ? own : std::min(own, largest_reaction);
 }
 
 } // namespace squeal

@@ -1,13 +1,26 @@
 #pragma once
-/// The brake's limit cycle by shooting at its period map (src/README.md, section 6). States are compared in the energy
-/// norm sqrt(u'K u + v'M v) only. All functions are collective. Those that integrate throw Interrupted where the run is
-/// asked to end.
-#include "squeal/cycle/measured_period.hpp"
-#include "squeal/cycle/options.hpp"
+/// How a cycle is sought, and how the reduced model serves.
+#include "squeal/cycle/period_map.hpp"
+#include "squeal/shooting/multipliers.hpp"
 #include "squeal/shooting/shooting.hpp"
+
+#include <optional>
 
 namespace squeal
 {
+
+/// Choices of the cycle.
+struct CycleOptions
+{
+  ShootingOptions shooting;
+  PetscInt samples = 32; // displacements kept over the last period
+  PetscInt reduced_modes =
+      100000; // complex modes of a reduced model at most, the nearest in frequency to the followed one
+};
+
+// The brake's limit cycle by shooting at its period map (src/README.md, section 6). States are compared in the energy
+// norm sqrt(u'K u + v'M v) only. All functions are collective. Those that integrate throw Interrupted where the run is
+// asked to end.
 
 /// What one factorisation of the step costs.
 struct StepCosts
@@ -85,5 +98,17 @@ LimitCycle find_cycle_from_resumed(const CycleProblem& problem, const CycleOptio
 /// The cycle from any start, after a number of free periods. `preconditioner`: null: that of the last of these.
 LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
                            const Preconditioner* preconditioner, int free_periods);
+
+// The checkpoint of a search for a cycle: the orbit that it has reached. A restarted search begins there, and finds
+// the same cycle to its tolerance.
+
+/// The orbit of the run that is gone on with; nothing where there is none. Collective.
+std::optional<ResumedOrbit> kept_cycle(const Structure& structure);
+
+/// Keeps the orbit from this start. Collective.
+void keep_cycle(const Structure& structure, Vec start, double period);
+
+/// Wraps the flow, which keeps the last orbit near a cycle that it integrates, when a checkpoint is due.
+void keep_cycles_of(Flow& flow, const Structure& structure);
 
 } // namespace squeal

@@ -9,7 +9,7 @@
 /// solves contact no better than the period before calls for, too. All functions are collective. Those that integrate
 /// throw Interrupted where the run is asked to end.
 #include "squeal/cycle/joints.hpp"
-#include "squeal/transient/step_tangent.hpp"
+#include "squeal/transient/theta_step.hpp"
 #include "squeal/transient/transient.hpp"
 
 namespace squeal
@@ -64,5 +64,32 @@ Flow flow_of(PeriodMap& map);
 
 /// Turns `rate`, which holds x_(N-1), into dPhi/dT. `end`, the state x_N, goes a step on.
 void complete_rate(PeriodMap& map, StepWork& work, State& end, Vec rate);
+
+// One period of the brake, recorded, and what is measured on it (src/README.md, section 6.10).
+
+/// What is measured on one period.
+struct MeasuredPeriod
+{
+  State start, end;                                    // with the reactions there
+  double mean_energy = 0, mean_fluctuating_energy = 0; // [J] fluctuating: with u - u0
+  double open_pairs_mean = 0;
+  int open_pairs_max = 0, stick_pairs_max = 0;
+  std::vector<double> peak_to_peak; // [m] per probe
+  History history;
+  JointUse joints{};
+  std::vector<Owned<Vec>> displacements;            // [m] samples of u, evenly spread over the period
+  std::vector<std::vector<ContactStatus>> statuses; // [step][pair]
+};
+
+/// What is kept of a period.
+struct Recording
+{
+  Mat probes = nullptr; // a row for each probe, or null
+  PetscInt samples = 0; // of the displacements
+};
+
+/// Integrates a period from the state `start`. `rate`: dPhi/dperiod at its end, or null. Collective. Where the run is
+/// asked to end it throws Interrupted.
+MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double period, Vec start, Vec rate);
 
 } // namespace squeal

@@ -14,6 +14,7 @@
 /// of D_nn + mu D_nt e is positive definite. That is checked where K alone is regular. Its stability is found by the
 /// modes.
 #include "squeal/algebra/bordered_factor.hpp"
+#include "squeal/contact/interface.hpp"
 #include "squeal/equilibrium/state.hpp"
 
 #include <memory>
@@ -109,5 +110,12 @@ private:
 
 /// A single equilibrium. Collective. Error: as of Equilibria.
 Equilibrium find_equilibrium(const Structure& structure, const Interface& interface, const EquilibriumOptions& options);
+
+// Tightening of bolts along the load path.
+
+/// Finds the shortenings that give bolts their tension in the equilibrium at the ends of the steps that tighten them.
+/// Adds what they do to the loads of these steps and all later ones. Newton's method, with the slopes by differences.
+/// Collective. Throws Error where there is no such equilibrium.
+void tighten(Structure& structure, const Interface& interface);
 
 } // namespace squeal

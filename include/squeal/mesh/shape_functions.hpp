@@ -4,6 +4,7 @@
 #include "squeal/mesh/mesh.hpp"
 
 #include <Eigen/Dense>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -36,5 +37,70 @@ NodePositions position_matrix(std::span<const Vec3> x);
 /// Returns the consistent nodal weights of a face [m2], the integrals of N_i n dA.
 /// The normal n points to where the nodes are counter-clockwise.
 std::vector<Vec3> face_weights(Shape shape, std::span<const Vec3> x);
+
+// Topology of shapes, in gmsh's node order (gmsh reference manual, "Node ordering"). Node numbers count from 0 within
+// the element or face. Tables of one rank; no function throws.
+
+/// Returns the shape of a gmsh element type; nothing if squeal does not know it.
+std::optional<Shape> shape_of(int gmsh_type);
+
+/// Number of nodes, number of corners, dimension, and whether an element of this shape is a shell.
+int node_count(Shape shape);
+int corner_count(Shape shape);
+int dimension_of(Shape shape);
+bool is_shell(Shape shape);
+
+/// Returns the nodes that the element or face uses.
+std::span<const int> nodes_of(const Element& element);
+std::span<const int> nodes_of(const Face& face);
+
+/// Returns where nodes are [m].
+std::vector<Vec3> positions_of(const Mesh& mesh, std::span<const int> nodes);
+
+/// Returns the two end nodes of the side of each mid-side node, in the order of the mid-side nodes.
+std::span<const std::array<int, 2>> mid_sides(Shape shape);
+
+/// Returns the corners of each face of a solid, counter-clockwise seen from outside. A triangle has -1 as its fourth.
+std::span<const std::array<int, 4>> corner_faces(Shape shape);
+
+/// Returns the corner nodes of each face of a solid, counter-clockwise seen from outside.
+std::vector<std::vector<int>> faces_of(const Element& element);
+
+/// Returns the node order of the mirrored element or face: entry i is the old number of the new node i.
+/// An element numbered inside out has a positive Jacobian in this order.
+std::vector<int> mirrored_order(Shape shape);
+
+// Quadrature rules on the reference elements, each with the shape functions at its points. Rules are made once and
+// live as long as the program.
+
+/// A point of a rule in one dimension, on [-1, 1].
+struct LinePoint
+{
+  double x = 0, weight = 0;
+};
+
+/// Gauss-Legendre rule of n = 2, 3 or 4 points; it is exact to degree 2 n - 1.
+std::vector<LinePoint> gauss(int n);
+
+/// A point of a rule.
+struct QuadraturePoint
+{
+  Eigen::Vector3d xi; // [-] natural coordinates
+  double weight = 0;  // [-] natural volume or area
+  ShapeFunctions at;  // shape functions of the rule's shape at xi
+};
+
+using Quadrature = std::vector<QuadraturePoint>;
+
+/// Returns the full integration of the stiffness; it is exact where the Jacobian is constant.
+const Quadrature& stiffness_rule(Shape shape);
+
+/// Returns a rule that is exact for N_i N_j det(J) where the sides are straight, and for N_i times the area vector of a
+/// face, whether its sides are straight or curved.
+const Quadrature& mass_rule(Shape shape);
+
+/// Returns the rule of n x n points on the unit triangle, n = 3 or 4, with the functions of a 3-node triangle. It is
+/// exact to degree 2 n - 2.
+const Quadrature& triangle_rule(int n);
 
 } // namespace squeal

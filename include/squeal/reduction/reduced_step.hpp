@@ -4,8 +4,10 @@
 /// that may change are collective among them.
 #include "squeal/contact/solver.hpp"
 #include "squeal/reduction/reduced_model.hpp"
+#include "squeal/transient/theta_step.hpp"
 
 #include <functional>
+#include <span>
 
 namespace squeal
 {
@@ -65,5 +67,33 @@ struct PeriodEnd
 
 /// The end of a period of this length and its derivative in the length, bit by bit the same on the map's ranks.
 PeriodEnd end_of_period(ReducedMap& map, double period, ReducedState state);
+
+// The derivative of the reduced period map (src/README.md, sections 4.13 and 7.5). Functions that take a map are
+// collective among its ranks.
+
+/// The contact of each step of a period.
+std::vector<StepRecord> record_contacts(ReducedMap& map, double period, ReducedState state);
+
+/// The same of the full model's recorded steps, as the reduced model sees them.
+std::vector<StepRecord> recorded_contacts(const ReducedModel& model, int directions,
+                                          std::span<const StepRecord> records);
+
+/// Columns of changes of the start, (q, v), to those of the period's end: the product of the steps' own tangents on the
+/// recorded contact. Each rank does its share of the columns.
+Eigen::MatrixXd apply_tangent(ReducedMap& map, double period, std::span<const StepRecord> contacts,
+                              const Eigen::MatrixXd& columns);
+
+/// Columns x to (dPhi/dx)'x.
+Eigen::MatrixXd apply_adjoint(ReducedMap& map, double period, std::span<const StepRecord> contacts,
+                              const Eigen::MatrixXd& columns);
+
+/// The derivative of a period's end (q, v) in the coordinates q and v of the slow shapes.
+Eigen::MatrixXd monodromy(ReducedMap& map, double period, std::span<const StepRecord> contacts);
+
+// The contact problem of one reduced step (src/README.md, section 7.4).
+
+/// The reactions after a step whose contact velocities are b without them; `contact` is of the step before. The
+/// residual is that of section 4.6. Returns whether it converged.
+bool solve_contact(const ReducedMap& map, const Eigen::VectorXd& b, ReducedContact& contact);
 
 } // namespace squeal

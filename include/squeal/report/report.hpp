@@ -1,11 +1,10 @@
 #pragma once
-/// All results of a run, and its files (report/results_folder.hpp) with the printed table. Every number comes with its
-/// unit and with what it is worth (residual, backward error, defect).
+/// The stages of a run, in the order in which they run, and their names.
 #include "squeal/attractors/attractors.hpp"
+#include "squeal/base/words.hpp"
 #include "squeal/branch/brake_branch.hpp"
-#include "squeal/contact/resultants.hpp"
-#include "squeal/report/stage.hpp"
-#include "squeal/settled/found_motion.hpp"
+#include "squeal/contact/interface.hpp"
+#include "squeal/settled/settled_motion.hpp"
 #include "squeal/study/response.hpp"
 #include "squeal/study/robustness.hpp"
 #include "squeal/study/sensitivity.hpp"
@@ -21,6 +20,31 @@
 
 namespace squeal
 {
+
+/// A stage of a run.
+enum class Stage
+{
+  model,
+  equilibrium,
+  modes,
+  estimate,
+  response,
+  transient,
+  cycle,
+  settled,
+  attractors,
+  branch,
+  sensitivity,
+  sweep,
+  robustness,
+};
+
+template <> inline constexpr std::array words_of<Stage> = {
+    "model",   "equilibrium", "modes",  "estimate",    "response", "transient", "cycle",
+    "settled", "attractors",  "branch", "sensitivity", "sweep",    "robustness"};
+
+// All results of a run, and its files (report/results_folder.hpp) with the printed table. Every number comes with its
+// unit and with what it is worth (residual, backward error, defect).
 
 /// A part of the scene with what it weighs.
 struct PartMass

@@ -1,11 +1,45 @@
 #pragma once
-/// The settled motion of the brake where no cycle attracts (src/README.md, section 7.10).
+/// The shapes of a motion in time (src/README.md, section 7.10). Velocities v at equal steps are kept as
+///     v = V q + what is left out,   V'M V = 1,   q = V'M v,   so that the kinetic energy of V q is q'q/2.
+/// V grows by what it misses of a sample. At the end it is turned to the principal axes of the samples, and those of
+/// little energy are left out.
+#include "squeal/algebra/multivector.hpp"
+#include "squeal/base/petsc.hpp"
+#include "squeal/cycle/fidelity.hpp"
 #include "squeal/cycle/limit_cycle.hpp"
 #include "squeal/settled/motion.hpp"
-#include "squeal/settled/motion_shapes.hpp"
+
+#include <vector>
 
 namespace squeal
 {
+
+/// Samples of a velocity on few shapes.
+struct MotionShapes
+{
+  MultiVector V;                                // [kg^-1/2]
+  std::vector<std::vector<double>> coordinates; // [shape][sample] q [m/s kg^1/2]
+  std::vector<double> squares;                  // v'Mv of each sample [J]
+  double largest = 0;                           // of those, whose V is to be met [J]
+  double left_out = 0;                          // part of the kinetic energy that the shapes miss
+};
+
+/// No sample yet; vectors are distributed as the columns of M.
+MotionShapes no_shapes(Mat M);
+
+/// The number of steps between samples. It is a divisor of `steps`, the largest one by which samples are not slower
+/// than 96 kHz, nearly five times what is heard.
+int steps_between_samples(int steps, double step_size);
+
+/// Appends a sample. V gains a shape where it misses 2e-3 of the largest velocity seen, up to `most` shapes.
+/// Collective.
+void add_sample(MotionShapes& motion, Mat M, Vec v, Vec Mv, PetscInt most);
+
+/// Turns the shapes to the principal axes of the samples from `first` on, the strongest first. Those of least energy go
+/// that hold 1e-6 of it together. Collective.
+void keep_strongest(MotionShapes& motion, std::size_t first);
+
+// The settled motion of the brake where no cycle attracts (src/README.md, section 7.10).
 
 /// outcome: "settled"; "not converged" where the motion never became stationary or its kind is undecided; "skipped"
 /// where a cycle answers.
@@ -39,5 +73,40 @@ void take_as_answer(const SettledMotion& motion, Outcome& of_cycle);
 
 /// Integrates on from the end of the search's free motion. Collective. A run that is asked to end throws Interrupted.
 SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, SettledOptions options);
+
+// The motion that was found from a point, and how it was sought.
+
+/// A state that a search starts from in place of the modes'.
+struct GivenStart
+{
+  State state;
+  double period = 0; // [s] of the cycle that it is nearly; 0: of none that is known
+  int rounds = 1;    // as many as the period may be of the cycle
+};
+
+/// One attempt to find what vibrates.
+struct Attempt
+{
+  std::string name;
+  int steps_per_period = 0; // with which it began
+  Outcome outcome;          // why it ended
+};
+
+/// The mode that the search for a cycle follows.
+struct FollowedMode
+{
+  std::size_t index = 0;            // among the modes
+  std::optional<Estimate> estimate; // where a given start chose it
+};
+
+/// Complete once it is returned; no stage changes it.
+struct Motion
+{
+  LimitCycle cycle;
+  Fidelity fidelity;     // of the cycle: the model that it was found on, and its errors
+  SettledMotion settled; // where no cycle attracts
+  FollowedMode followed;
+  std::vector<Attempt> attempts; // in order
+};
 
 } // namespace squeal

@@ -11,7 +11,7 @@
 /// The leading block is factored. Without y, as with one tangential direction and constant mu, that is exact. Else a
 /// fixed point finds y, which contracts fast where w_t is large beside its changes. Where it does not, y is eliminated.
 #include "squeal/contact/solver.hpp"
-#include "squeal/transient/step_record.hpp"
+#include "squeal/transient/theta_step.hpp"
 
 namespace squeal
 {

@@ -1,26 +1,68 @@
 #pragma once
-/// A step of the modified theta-method with exact contact (src/README.md, sections 4.1 to 4.3):
-///     A v+ = [M - h(1-theta) C - h^2 theta(1-theta) K] v - h K u + h F + h B'r+,   A = M + h theta C + h^2 theta^2 K,
-///     0 <= gap + B_n ut + h B_n v+  _|_  r_n+ >= 0,   ut = u + h(1-theta) v,   r_t+ in the Coulomb disc.
-/// Reactions are implicit, an impulse h r+ of the whole step; theta = 1/2 adds no damping of its own.
-///
-/// Friction opposes s_theta = theta s+ + (1-theta) s, the velocity that its work is done with. A step is then of second
-/// order in sliding where friction turns, too, and friction never gives energy. Where that would stop a pair or turn it
-/// back it opposes s+ instead, since s_theta = 0 is not rest. (The paper's s+ everywhere is of first order where
-/// friction turns.) Functions that take a structure are collective.
-#include "squeal/algebra/paired_matrices.hpp"
-#include "squeal/contact/condensed.hpp"
+/// How steps are made, of the transient and of the cycle.
+#include "squeal/algebra/bordered_factor.hpp"
+#include "squeal/algebra/sparse_matrices.hpp"
+#include "squeal/base/petsc.hpp"
+#include "squeal/contact/contact_operator.hpp"
 #include "squeal/contact/solver.hpp"
 #include "squeal/equilibrium/state.hpp"
-#include "squeal/transient/step_options.hpp"
-#include "squeal/transient/step_record.hpp"
+#include "squeal/modes/modes.hpp"
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 namespace squeal
 {
+
+/// Options -transient_... of the step.
+struct StepOptions
+{
+  ContactSettings contact{};
+  bool refuse = true;     // what step_guards.hpp refuses
+  FactorOptions factor{}; // those of ProgramOptions
+};
+
+// What the tangent of a step needs to know of it (src/README.md, section 4.13). `advance` fills it where one is given.
+
+/// What of a step is recorded.
+enum class Recorded
+{
+  contact,
+  contact_and_rates, // the column of h needs the rates
+};
+
+class LinearContact;
+
+/// The record of one step; that of a reduced model has the contact of its active pairs alone.
+struct StepRecord
+{
+  Recorded wanted = Recorded::contact;
+
+  // the same on every rank
+  std::vector<double> reactions;        // [N] r+
+  std::vector<double> contact_velocity; // [m/s] w = W r+ + b
+  std::vector<char> opposes_theta;      // chi of each pair: 1 where friction opposes s_theta (section 4.3)
+
+  // rates
+  Owned<Vec> force;        // [N] M (v+ - v)/h - theta K (u+ - u)
+  Owned<Vec> v_theta;      // [m/s]
+  std::vector<double> gap; // [m] g0 + B_n u of each pair, on every rank
+
+  mutable std::shared_ptr<const LinearContact> linear{}; // kept by rank 0 for the columns to come, where there is room
+};
+
+// A step of the modified theta-method with exact contact (src/README.md, sections 4.1 to 4.3):
+//     A v+ = [M - h(1-theta) C - h^2 theta(1-theta) K] v - h K u + h F + h B'r+,   A = M + h theta C + h^2 theta^2 K,
+//     0 <= gap + B_n ut + h B_n v+  _|_  r_n+ >= 0,   ut = u + h(1-theta) v,   r_t+ in the Coulomb disc.
+// Reactions are implicit, an impulse h r+ of the whole step; theta = 1/2 adds no damping of its own.
+//
+// Friction opposes s_theta = theta s+ + (1-theta) s, the velocity that its work is done with. A step is then of second
+// order in sliding where friction turns, too, and friction never gives energy. Where that would stop a pair or turn it
+// back it opposes s+ instead, since s_theta = 0 is not rest. (The paper's s+ everywhere is of first order where
+// friction turns.) Functions that take a structure are collective.
 
 /// Everything that depends on h: factored A and W = h B A^-1 B', so that contact solves w = W r + b for r in N.
 /// Built once per h.
@@ -126,5 +168,57 @@ std::vector<StepReport> advance(const ThetaStep& step, const Structure& structur
 /// Of one.
 StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
                    State& state);
+
+// The exact tangent of theta steps along a recorded motion (src/README.md, section 4.13).
+//
+// Statuses, friction directions and reactions are those of the record, so that a step is a linear map without contact
+// iterations. Columns share each reading of the factor, of M, K and of W.
+//
+// Caveat: the step is piecewise smooth. The tangent does not see a change of the start that changes a status.
+
+/// A change of the state and its causes besides the change of the start.
+struct TangentColumn
+{
+  Owned<Vec> u, v;      // du [m], dv [m/s]
+  double step_size = 0; // [s] dh of every step; the records then need their rates
+  double friction = 0;  // change of the friction law's coefficient in every step
+};
+
+/// The records of `steps` steps made in place. Collective. The state becomes that at their end.
+std::vector<StepRecord> record_steps(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                                     State& state, int steps, Recorded wanted);
+
+/// From changes at the start of the recorded steps to those at their end, in place. Collective.
+void advance_tangents(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                      std::span<const StepRecord> records, std::span<TangentColumn> columns);
+
+// When theta and the step size h would show a wrong growth (src/README.md, sections 4.10, 4.11). In sliding an
+// eigenvalue lambda is marched as
+//     lambda_h = ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h,   Re(lambda_h) = 0 where
+//     2 Re(lambda) = (2 theta - 1) h |lambda|^2:
+// - theta > 1/2 with fewer than 2 pi (theta - 1/2) |lambda|^2/(omega sigma) steps a period: what grows looks stable;
+// - theta < 1/2 with fewer than 2 pi (1/2 - theta) |lambda|^2/(omega sigma): most of the growth is the scheme's own;
+// - theta < 1/2 also amplifies every stable mode with -Re(lambda) < (1/2 - theta) h |lambda|^2, up to the highest one
+//   of the mesh. No run is refused for it: the march says so, and ends where its energy is no longer finite.
+// - friction falls with the speed so steeply that a step may have several solutions. The largest eigenvalue of |mu'|
+//   diag(r_n0) W_tt, at rest, is not below 1. W holds h, so that enough steps bring it below. Ramps raise mu and r_n0
+//   by the largest product of their factors.
+// All refusals are lifted by StepOptions::refuse.
+
+/// ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h [1/s]. lambda in [1/s], h in [s]. Not collective.
+std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double theta, double h);
+
+/// Why a run with this theta and h is refused, in a sentence with the remedy; empty if it is not. `mode`: the followed
+/// one, or null. Not collective.
+std::string step_refusal(const ComplexMode* mode, double theta, double h, const StepOptions& options);
+
+/// The largest eigenvalue of |mu'| diag(r_n) W_tt with the steepest fall of mu; 0 where mu does not fall. A step has
+/// one solution while it is below 1. Collective.
+double fall_of_friction(const ThetaStep& step, const Interface& interface, const std::vector<double>& reactions);
+
+/// Why a run is refused whose step may have several solutions, with the steps that have one; empty if it is not.
+/// Factors A where mu falls. `increase`: largest factor in time on mu r_n. Collective.
+std::string friction_refusal(const SlidingEquilibrium& sliding, const ComplexMode* mode, double theta, double h,
+                             const StepOptions& options, double increase);
 
 } // namespace squeal
