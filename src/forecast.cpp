@@ -5,6 +5,7 @@
 #include "squeal/forecast.hpp"
 
 #include "squeal/algebra/bordered_factor.hpp"
+#include "squeal/base/available_memory.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "squeal/point.hpp"
 #include "squeal/reduction/reduced_model.hpp"

@@ -11,7 +11,7 @@
 /// not recognise, and its scripts can run commands and write files. A new process ends the mesher with SIGSYS, so that
 /// a command is a message and not a mesh without it. The other calls fail, because libraries make some of them for
 /// reasons of their own.
-#include "squeal/base/free_memory.hpp"
+#include "squeal/base/available_memory.hpp"
 #include "squeal/mesh/file_mesh.hpp"
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 #include "squeal/base/free_memory.hpp"
 
+#include "squeal/base/available_memory.hpp"
 #include "squeal/base/petsc.hpp"
 
 #include <algorithm>

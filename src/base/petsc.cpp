@@ -1,6 +1,6 @@
 #include "squeal/base/petsc.hpp"
 
-#include "squeal/base/free_memory.hpp"
+#include "squeal/base/available_memory.hpp"
 
 #include <algorithm>
 #include <cerrno>

@@ -336,44 +336,6 @@ double residual_of(const PathOperators& operators, const Interface& interface, c
   return residual;
 }
 
-} // namespace
-
-PathOperators path_operators(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)
-{
-  const bool driven = !has_undriven_pairs(interface);
-  PathOperators operators{shared(structure.K.get()),
-                          shared(interface.B.get()),
-                          driven,
-                          driven ? hold(structure, interface, options.factor)
-                                 : hold_by_all_rows(structure, interface, options.factor),
-                          {}};
-  if (interface.pairs == 0) return operators;
-  const PairRows<Index> rows(interface.directions);
-  const Index size = rank_of(comm_of(interface.B)) == 0 ? rows.rows_of(interface.pairs) : 0;
-  operators.D.resize(driven ? size / rows.per_pair() : size, size);
-  const auto set = [&](Index row, Index column, double value)
-  {
-    if (!driven)
-      operators.D(row, column) = value;
-    else if (rows.is_normal(row))
-      operators.D(rows.pair_of(row), column) = value;
-  };
-  operators.held.factor.read_condensed(
-      [&](const CondensedStrip& strip)
-      {
-        for (std::size_t j = strip.first; j < strip.last; ++j)
-          for (std::size_t i = j; i < strip.first + strip.height; ++i)
-          {
-            set(static_cast<Index>(i), static_cast<Index>(j), strip.entry(i, j));
-            set(static_cast<Index>(j), static_cast<Index>(i), strip.entry(i, j));
-          }
-      });
-  return operators;
-}
-
-namespace
-{
-
 /// The outcome of a search that found nothing.
 Outcome failure(const PathOperators& operators, const Interface& interface, const Found& found)
 {

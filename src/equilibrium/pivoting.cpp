@@ -345,4 +345,37 @@ bool balances(const Structure& structure, const Interface& interface, Equilibriu
   return equilibrium.force_residual <= 1e-9 || defect <= 4 * PETSC_MACHINE_EPSILON * stiffness * motion;
 }
 
+PathOperators path_operators(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)
+{
+  const bool driven = !has_undriven_pairs(interface);
+  PathOperators operators{shared(structure.K.get()),
+                          shared(interface.B.get()),
+                          driven,
+                          driven ? hold(structure, interface, options.factor)
+                                 : hold_by_all_rows(structure, interface, options.factor),
+                          {}};
+  if (interface.pairs == 0) return operators;
+  const PairRows<Eigen::Index> rows(interface.directions);
+  const Eigen::Index size = rank_of(comm_of(interface.B)) == 0 ? rows.rows_of(interface.pairs) : 0;
+  operators.D.resize(driven ? size / rows.per_pair() : size, size);
+  const auto set = [&](Eigen::Index row, Eigen::Index column, double value)
+  {
+    if (!driven)
+      operators.D(row, column) = value;
+    else if (rows.is_normal(row))
+      operators.D(rows.pair_of(row), column) = value;
+  };
+  operators.held.factor.read_condensed(
+      [&](const CondensedStrip& strip)
+      {
+        for (std::size_t j = strip.first; j < strip.last; ++j)
+          for (std::size_t i = j; i < strip.first + strip.height; ++i)
+          {
+            set(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j), strip.entry(i, j));
+            set(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(i), strip.entry(i, j));
+          }
+      });
+  return operators;
+}
+
 } // namespace squeal

@@ -68,11 +68,11 @@ void add_point(const std::string& name, const Vec3& position, Mesh& mesh)
 /// The node of the mesh, among the candidates, where a retained node is.
 int joined_node(const Mesh& mesh, const std::set<int>& candidates, const PlacedNode& retained, const std::string& user)
 {
-  constexpr double coincident = 1e-6; // of the mesh's size: places in a mesh file have as many digits
+  constexpr double same_place = 1e-6; // of the mesh's size: places in a mesh file have as many digits
   const auto distance = [&](int node) { return norm(mesh.nodes[static_cast<std::size_t>(node)] - retained.at); };
   const int nearest =
       *std::min_element(candidates.begin(), candidates.end(), [&](int a, int b) { return distance(a) < distance(b); });
-  if (distance(nearest) > coincident * diagonal_of(mesh.nodes))
+  if (distance(nearest) > same_place * diagonal_of(mesh.nodes))
     throw Error(
         user + ": node " + std::to_string(retained.node) +
         format(" at (%g, %g, %g) m meets no node: the nearest is %.3g m away; mesh the parts so that their nodes "
