@@ -1,7 +1,7 @@
 // ranks: 1
 // Where contact solvers fail: the fixed point beyond rho = 2/lambda_max(W), both at large friction and on
 // ill-conditioned W; what is not solved must say so.
-#include "contact_problem.hpp"
+#include "../support/contact_problem.hpp"
 #include "squeal/equilibrium/path_walk.hpp"
 
 #include <algorithm>

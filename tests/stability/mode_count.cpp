@@ -1,5 +1,5 @@
 // Where eigenvalues crowd, a pair moves like the square root of a change.
-#include "flutter_chain.hpp"
+#include "../support/flutter_chain.hpp"
 #include "squeal/algebra/shift_invert.hpp"
 #include "squeal/modes/modes.hpp"
 #include "squeal/modes/real_modes.hpp"

@@ -1,5 +1,5 @@
 // Where theta and the step size make growth rates wrong: the boundary from both sides, and the refusals that guard it.
-#include "oscillator_mode.hpp"
+#include "../support/oscillator_mode.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/transient/transient.hpp"
 

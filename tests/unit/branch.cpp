@@ -1,5 +1,5 @@
 // Continuation on smooth oscillators whose branches are known exactly; it knows no brake.
-#include "smooth_flows.hpp"
+#include "../support/smooth_flows.hpp"
 #include "squeal/branch/continuation.hpp"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // ranks: 1 2 3 4
-#include "option.hpp"
-#include "small_models.hpp"
+#include "../support/option.hpp"
+#include "../support/small_models.hpp"
 #include "squeal/contact/contact_operator.hpp"
 
 #include <array>

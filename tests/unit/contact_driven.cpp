@@ -1,6 +1,6 @@
 // ranks: 1
 // The rest of driven pairs, whose friction is part of the compliance, against every set of closed pairs.
-#include "contact_problem.hpp"
+#include "../support/contact_problem.hpp"
 #include "squeal/equilibrium/path_walk.hpp"
 
 #include <algorithm>

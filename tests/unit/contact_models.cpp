@@ -1,5 +1,5 @@
 // ranks: 1 2 3
-#include "small_models.hpp"
+#include "../support/small_models.hpp"
 
 #include <doctest/doctest.h>
 

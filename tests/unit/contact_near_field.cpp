@@ -1,5 +1,5 @@
 // ranks: 1
-#include "contact_problem.hpp"
+#include "../support/contact_problem.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // ranks: 1 2 3 4
 // Sweeps of ranks that share W: a residual of 1e-10 leaves 1e-8 of a reaction where cond(W) < 100.
-#include "contact_problem.hpp"
+#include "../support/contact_problem.hpp"
 
 #include <algorithm>
 #include <cmath>

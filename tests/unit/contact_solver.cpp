@@ -1,4 +1,4 @@
-#include "contact_problem.hpp"
+#include "../support/contact_problem.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // What shooting must do on the three-degree unilateral oscillator, on any number of ranks.
-#include "approx.hpp"
-#include "cycle_of.hpp"
-#include "pressed_masses.hpp"
-#include "small_models.hpp"
+#include "../support/approx.hpp"
+#include "../support/cycle_of.hpp"
+#include "../support/pressed_masses.hpp"
+#include "../support/small_models.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 // ranks: 1 2 3
 #include "squeal/equilibrium/equilibrium.hpp"
 
-#include "small_models.hpp"
+#include "../support/small_models.hpp"
 #include "squeal/base/petsc.hpp"
 
 #include <algorithm>

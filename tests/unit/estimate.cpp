@@ -1,8 +1,8 @@
 // ranks: 1 2 3
 #include "squeal/transient/estimate.hpp"
-#include "approx.hpp"
-#include "linearised.hpp"
-#include "sliding_oscillator.hpp"
+#include "../support/approx.hpp"
+#include "../support/linearised.hpp"
+#include "../support/sliding_oscillator.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

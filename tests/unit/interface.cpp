@@ -1,7 +1,7 @@
 // ranks: 1 2 3
 // The contact rows of a mesh by what they must read of known motions: openings, slidings, drives, frames.
 #include "squeal/contact/interface.hpp"
-#include "bricks.hpp"
+#include "../support/bricks.hpp"
 
 #include <algorithm>
 #include <doctest/doctest.h>

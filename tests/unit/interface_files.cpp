@@ -1,7 +1,7 @@
 // ranks: 1 2 3
 // Matrix scenes: what is written is what is read, on any number of ranks, and a damaged folder is one message.
+#include "../support/temporary_folder.hpp"
 #include "squeal/contact/interface.hpp"
-#include "temporary_folder.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

@@ -1,5 +1,5 @@
 // ranks: 1 2 3
-#include "blocks.hpp"
+#include "../support/blocks.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 

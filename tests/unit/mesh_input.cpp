@@ -1,7 +1,7 @@
 // ranks: 1
 // What a geometry says about itself before gmsh reads it, and contents that do not fit their ending.
+#include "../support/temporary_folder.hpp"
 #include "squeal/mesh/mesh_file.hpp"
-#include "temporary_folder.hpp"
 
 #include <doctest/doctest.h>
 

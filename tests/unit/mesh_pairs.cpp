@@ -1,6 +1,6 @@
 // ranks: 1 2 3
-#include "blocks.hpp"
-#include "bricks.hpp"
+#include "../support/blocks.hpp"
+#include "../support/bricks.hpp"
 #include "squeal/mesh/contact_pairs.hpp"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // ranks: 1 2 3
 #include "squeal/modes/modes.hpp"
-#include "linearised.hpp"
-#include "sliding_oscillator.hpp"
+#include "../support/linearised.hpp"
+#include "../support/sliding_oscillator.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/algebra/quadratic_residual.hpp"
 #include "squeal/base/constants.hpp"

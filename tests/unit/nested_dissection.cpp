@@ -1,6 +1,6 @@
 // ranks: 1 2 3 4
 // Orders of elimination by nested dissection.
-#include "symbolic_factor.hpp"
+#include "../../src/algebra/symbolic_factor.hpp"
 
 #include <algorithm>
 #include <doctest/doctest.h>

@@ -1,7 +1,7 @@
 // ranks: 1 2 3
 // The factor of K - shift M by either way of several ranks, where every rank makes it whole and where they share it:
 // residuals of a matrix whose condition is below 1e4 are below 1e-11 of the right-hand side.
-#include "small_models.hpp"
+#include "../support/small_models.hpp"
 #include "squeal/algebra/shift_invert.hpp"
 
 #include <doctest/doctest.h>

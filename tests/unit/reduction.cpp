@@ -1,9 +1,9 @@
 // The compliance of active pairs that a reduced model with fewer attachment shapes is said to lose, and its motion and
 // tangent by one rank and by all together.
 // ranks: 1 2 3
-#include "approx.hpp"
-#include "linearised.hpp"
-#include "pressed_masses.hpp"
+#include "../support/approx.hpp"
+#include "../support/linearised.hpp"
+#include "../support/pressed_masses.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/reduction/reduced_step.hpp"

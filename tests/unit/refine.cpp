@@ -1,6 +1,6 @@
 // ranks: 1 2
 // Division of meshes: every element fills its parent, neighbours agree, groups and surfaces are carried over.
-#include "blocks.hpp"
+#include "../support/blocks.hpp"
 #include "squeal/mesh/contact_pairs.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/shape_functions.hpp"

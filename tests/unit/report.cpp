@@ -1,7 +1,7 @@
 // ranks: 1 2 3
 #include "squeal/report/report.hpp"
+#include "../support/temporary_folder.hpp"
 #include "squeal/model.hpp"
-#include "temporary_folder.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // ranks: 1
 #include "squeal/scene/scene.hpp"
+#include "../support/temporary_folder.hpp"
 #include "squeal/scene/numbers.hpp"
-#include "temporary_folder.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,5 +1,5 @@
 // What a motion settles on: means with their bars, spectra, Lyapunov exponents and kinds, on series and smooth flows.
-#include "smooth_flows.hpp"
+#include "../support/smooth_flows.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/settled/motion.hpp"
 

@@ -1,7 +1,7 @@
 // ranks: 1 2 3 4
 // A W whose columns ranks share, against the same one as a whole: rounding of two ways to one matrix.
-#include "contact_problem.hpp"
-#include "small_models.hpp"
+#include "../support/contact_problem.hpp"
+#include "../support/small_models.hpp"
 #include "squeal/base/broadcast.hpp"
 #include "squeal/contact/contact_operator.hpp"
 

@@ -1,6 +1,6 @@
 // The whole shooting on smooth oscillators, which know no brake, against their periods, amplitudes and multipliers.
 #include "squeal/shooting/shooting.hpp"
-#include "smooth_flows.hpp"
+#include "../support/smooth_flows.hpp"
 #include "squeal/base/constants.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // The parts of the shooting solver, each by itself, on smooth oscillators.
-#include "smooth_flows.hpp"
+#include "../support/smooth_flows.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/shooting/multipliers.hpp"
 #include "squeal/shooting/secants.hpp"

@@ -1,6 +1,6 @@
 // The tangent of recorded steps against central differences of the steps themselves. Differences of 1e-6 of the motion
 // have an error of 1e-7 by contact solved to 1e-13, and less by curvature: 1e-6 of the change is asked.
-#include "oscillator_mode.hpp"
+#include "../support/oscillator_mode.hpp"
 #include "squeal/transient/theta_step.hpp"
 
 #include <doctest/doctest.h>

@@ -2,8 +2,8 @@
 // Assembly and constraints by their exact invariants: rigid motions, masses and inertias, point models, resultants.
 // Tolerances are round-off of sums of some thousand terms unless said otherwise.
 #include "squeal/solid/structure.hpp"
-#include "approx.hpp"
-#include "bricks.hpp"
+#include "../support/approx.hpp"
+#include "../support/bricks.hpp"
 #include "squeal/solid/binary.hpp"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // ranks: 1 2 3
 // Joints, loads and supports: couplings, connectors, beams, bolts, gravity, moved and turned
 // supports. Each against its closed form; tolerances are round-off of sums of some hundred terms.
-#include "approx.hpp"
-#include "bricks.hpp"
+#include "../support/approx.hpp"
+#include "../support/bricks.hpp"
 #include "squeal/equilibrium/equilibrium.hpp"
 
 #include <doctest/doctest.h>

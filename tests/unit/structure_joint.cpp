@@ -1,6 +1,6 @@
 // ranks: 1 2 3
 // A shell that meets a solid at shared nodes or is tied to it: free of energy in rigid motions, and stiff in bending.
-#include "bricks.hpp"
+#include "../support/bricks.hpp"
 #include "squeal/mesh/contact_pairs.hpp"
 
 #include <algorithm>

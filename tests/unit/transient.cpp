@@ -1,9 +1,9 @@
 // ranks: 1 2 3
 #include "squeal/transient/transient.hpp"
-#include "approx.hpp"
-#include "option.hpp"
-#include "oscillator_mode.hpp"
-#include "temporary_folder.hpp"
+#include "../support/approx.hpp"
+#include "../support/option.hpp"
+#include "../support/oscillator_mode.hpp"
+#include "../support/temporary_folder.hpp"
 
 #include <cmath>
 #include <doctest/doctest.h>

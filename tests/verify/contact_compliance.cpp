@@ -2,10 +2,10 @@
 // Contact with a normal compliance c in series with each pair: r_n = max(0, -g)/c. Exact: a block pressed by N
 // approaches by c N and swings on the contact at sqrt(1/(c m)); sliding with friction mu has the stiffness K + (B_n +
 // mu B_t)'B_n/c; a free mass thrown onto the contact leaves it after pi sqrt(c m) with its speed.
-#include "approx.hpp"
-#include "linearised.hpp"
+#include "../support/approx.hpp"
+#include "../support/linearised.hpp"
+#include "../support/step_checks.hpp"
 #include "squeal/reduction/reduced_model.hpp"
-#include "step_checks.hpp"
 
 #include <Eigen/Dense>
 #include <numbers>

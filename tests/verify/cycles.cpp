@@ -1,8 +1,8 @@
 // ranks: 1
 // Limit cycles of the three-degree unilateral oscillator against exact ones (matrix exponentials between events).
-#include "approx.hpp"
-#include "cycle_of.hpp"
-#include "small_models.hpp"
+#include "../support/approx.hpp"
+#include "../support/cycle_of.hpp"
+#include "../support/small_models.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // ranks: 1 2 3
 // Exact-contact dynamics against exact answers, on models small enough to have them.
-#include "approx.hpp"
-#include "oscillator_mode.hpp"
+#include "../support/approx.hpp"
+#include "../support/oscillator_mode.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/transient/transient.hpp"
 

@@ -3,10 +3,10 @@
 //     m x'' + c x' + k x = N mu(|V - x'|) sign(V - x').
 // Steady sliding grows as -(c + N mu'(V))/(2m). The Hopf speed is where that vanishes. The period of stick-slip follows
 // from one integration of slip, from the end of stick to where x' = V again, and from stick at x' = V.
-#include "approx.hpp"
-#include "cycle_of.hpp"
-#include "linearised.hpp"
-#include "oscillator_mode.hpp"
+#include "../support/approx.hpp"
+#include "../support/cycle_of.hpp"
+#include "../support/linearised.hpp"
+#include "../support/oscillator_mode.hpp"
 #include "squeal/transient/theta_step.hpp"
 
 #include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>

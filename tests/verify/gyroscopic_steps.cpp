@@ -2,8 +2,8 @@
 // Steps with a gyroscopic part G, which does no work: the discrete eigenvalues are those of the modes with it, energy
 // closes, and the tangent is the difference quotient. A spinning mass on springs k has the frequencies
 // sqrt(k/m + (g/2m)^2) +- g/2m.
-#include "linearised.hpp"
-#include "step_checks.hpp"
+#include "../support/linearised.hpp"
+#include "../support/step_checks.hpp"
 
 using namespace squeal;
 using namespace squeal::test;

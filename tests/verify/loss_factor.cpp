@@ -1,7 +1,7 @@
 // ranks: 1 2
 // Modes with loss factors: those of complex stiffness. With one eta everywhere they are i w sqrt(1 + i eta), w the
 // undamped frequency. With several eta the problem is solved dense.
-#include "linearised.hpp"
+#include "../support/linearised.hpp"
 #include "squeal/solid/structure.hpp"
 
 #include <algorithm>

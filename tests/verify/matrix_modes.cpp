@@ -3,7 +3,7 @@
 //     M = 1,  C = c,  K = s (2 - 2 cos) + (k1, k2),  G = g J,  H = h J,  J = [0 1; -1 0] in each cell.
 // Each wave of the chain, kappa_j = s (2 - 2 cos(j pi/(n + 1))), leaves two motions, exactly:
 //     (lambda^2 + c lambda + kappa + k1) (lambda^2 + c lambda + kappa + k2) + (g lambda + h)^2 = 0.
-#include "linearised.hpp"
+#include "../support/linearised.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/solid/structure.hpp"
 

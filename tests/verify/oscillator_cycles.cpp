@@ -1,6 +1,6 @@
 // ranks: 1
 // Limit cycles of the unilateral oscillator by long integration, against matrix exponentials between events.
-#include "oscillator_mode.hpp"
+#include "../support/oscillator_mode.hpp"
 #include "squeal/transient/transient.hpp"
 
 using namespace squeal;

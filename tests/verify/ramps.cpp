@@ -4,8 +4,8 @@
 // Exact: a force that rises as t/T from rest gives x = F/(k T) (t - sin(w t)/w), with w^2 = k/m, whether the load rises
 // or the friction of a belt that is always faster. On a belt with V = a t the mass sticks, x = a t^2/2, until
 // k x + m a = mu N, and then vibrates about mu N/k.
-#include "approx.hpp"
-#include "oscillator_mode.hpp"
+#include "../support/approx.hpp"
+#include "../support/oscillator_mode.hpp"
 
 using namespace squeal;
 using namespace squeal::test;

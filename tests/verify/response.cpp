@@ -1,8 +1,8 @@
 /// Frequency responses against dense algebra (src/README.md, section 13).
 // ranks: 1 2
 #include "squeal/study/response.hpp"
-#include "linearised.hpp"
-#include "sliding_oscillator.hpp"
+#include "../support/linearised.hpp"
+#include "../support/sliding_oscillator.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/constants.hpp"
 

@@ -1,6 +1,6 @@
 // ranks: 1 2 3
 // Small motions about contacts that have slipped, and the answer mirrored where the drive is reversed.
-#include "linearised.hpp"
+#include "../support/linearised.hpp"
 #include "squeal/transient/theta_step.hpp"
 
 #include <algorithm>

@@ -2,7 +2,7 @@
 /// A finite element program of a page, to hold the kernels to exact answers. Meshes are by formula, of one material;
 /// sparse matrices on one process. Displacements are prescribed by elimination, eigenpairs found by subspace
 /// iteration.
-#include "approx.hpp"
+#include "../support/approx.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 #include "squeal/solid/element.hpp"
 

@@ -1,8 +1,8 @@
 // ranks: 1 2
 // Parts that spin, in the frame at rest. Rigid motions keep no stiffness, whatever the mesh; the gyroscopic matrix of
 // tilts is rate I_p; a thin ring that does not stretch has the doublets of src/README.md, section 1.10.
-#include "bricks.hpp"
-#include "linearised.hpp"
+#include "../support/bricks.hpp"
+#include "../support/linearised.hpp"
 #include "small_fem.hpp"
 #include "squeal/solid/structure.hpp"
 

@@ -1,7 +1,7 @@
 // Published and exact eigenvalues of sliding systems.
-#include "flutter_chain.hpp"
-#include "linearised.hpp"
-#include "sliding_oscillator.hpp"
+#include "../support/flutter_chain.hpp"
+#include "../support/linearised.hpp"
+#include "../support/sliding_oscillator.hpp"
 #include "squeal/modes/modes.hpp"
 #include "squeal/modes/passes.hpp"
 

@@ -1,6 +1,6 @@
 // ranks: 1 2 3
 // Ties of bricks meshed 3:2: rigid motions without strain, constant stress without force, all of the mass.
-#include "bricks.hpp"
+#include "../support/bricks.hpp"
 #include "squeal/mesh/contact_pairs.hpp"
 
 #include <doctest/doctest.h>

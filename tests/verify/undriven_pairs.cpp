@@ -1,8 +1,8 @@
 // ranks: 1 2
 // Contacts without a drive in time, at rest and in modes, against exact answers.
-#include "linearised.hpp"
+#include "../support/linearised.hpp"
+#include "../support/temporary_folder.hpp"
 #include "squeal/transient/theta_step.hpp"
-#include "temporary_folder.hpp"
 
 #include <algorithm>
 #include <array>
