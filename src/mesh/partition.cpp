@@ -1,8 +1,8 @@
 /// Partition of the mesh by METIS (Karypis and Kumar 1998).
 ///
-/// Two nodes are neighbours when an element has both. The slave node of a contact pair and the master node of largest
-/// weight are merged into one vertex, so that both have the same owner. The weight of a vertex is the number of its
-/// nodal degrees of freedom.
+/// Graph: two nodes are neighbours when an element has both. The slave node of a contact pair and the master node of
+/// largest weight are merged into one vertex, so that both have the same owner. The weight of a vertex is the number of
+/// its nodal degrees of freedom.
 #include "squeal/mesh/contact_pairs.hpp"
 
 #include "squeal/base/disjoint_sets.hpp"
@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <metis.h>
+#include <numeric>
 
 namespace squeal
 {
@@ -22,7 +23,7 @@ namespace
 struct Vertices
 {
   std::vector<int> of_node;
-  idx_t count = 0;
+  int count = 0;
 };
 
 /// Merges the two heaviest nodes of each pair, and of pairs that share one, into one vertex.
@@ -36,38 +37,76 @@ Vertices merge_pairs(std::size_t nodes, const std::vector<ContactPair>& pairs)
   return vertices;
 }
 
-/// Returns the owner of each vertex. Each rank owns at least one vertex, where there are as many.
-std::vector<idx_t> owners_of(const Mesh& mesh, Vertices vertices, idx_t ranks)
+/// Adjacency in compressed rows, as METIS takes it.
+struct Graph
 {
-  std::vector<idx_t> offsets{0}, nodes, weights(vertices.count, 0), element_owner(mesh.elements.size()),
-      owner(vertices.count), options(METIS_NOPTIONS);
+  std::vector<idx_t> offsets, neighbours, weights;
+};
+
+Graph node_graph(const Mesh& mesh, const Vertices& vertices)
+{
   std::vector<int> dofs(mesh.nodes.size(), 3);
-  for (const Element& element : mesh.elements)
-  {
-    for (const int node : nodes_of(element))
+  std::vector<std::vector<int>> elements_of(vertices.count);
+  for (std::size_t e = 0; e < mesh.elements.size(); ++e)
+    for (const int node : nodes_of(mesh.elements[e]))
     {
-      if (is_shell(element.shape)) dofs[node] = 6;
-      nodes.push_back(vertices.of_node[node]);
+      if (is_shell(mesh.elements[e].shape)) dofs[node] = 6;
+      elements_of[vertices.of_node[node]].push_back(static_cast<int>(e));
     }
-    offsets.push_back(static_cast<idx_t>(nodes.size()));
+  Graph graph;
+  graph.weights.assign(vertices.count, 0);
+  for (std::size_t i = 0; i < dofs.size(); ++i) graph.weights[vertices.of_node[i]] += dofs[i];
+  graph.offsets = {0};
+  std::vector<idx_t> neighbours;
+  for (int v = 0; v < vertices.count; ++v)
+  {
+    neighbours.clear();
+    for (const int e : elements_of[v])
+      for (const int node : nodes_of(mesh.elements[e]))
+        if (const int other = vertices.of_node[node]; other != v) neighbours.push_back(other);
+    std::sort(neighbours.begin(), neighbours.end());
+    graph.neighbours.insert(graph.neighbours.end(), neighbours.begin(),
+                            std::unique(neighbours.begin(), neighbours.end()));
+    graph.offsets.push_back(static_cast<idx_t>(graph.neighbours.size()));
   }
-  for (std::size_t i = 0; i < dofs.size(); ++i) weights[vertices.of_node[i]] += dofs[i];
-  METIS_SetDefaultOptions(options.data());
+  return graph;
+}
+
+/// Returns the owner of each vertex. Each rank owns at least one vertex; `graph` must have as many.
+std::vector<int> partition_graph(Graph graph, int ranks)
+{
+  idx_t vertices = static_cast<idx_t>(graph.weights.size()), constraints = 1, parts = ranks, cut = 0;
+  idx_t options[METIS_NOPTIONS];
+  METIS_SetDefaultOptions(options);
   options[METIS_OPTION_SEED] = 1; // the same partition on every run
-  auto elements = static_cast<idx_t>(mesh.elements.size());
-  idx_t cut = 0;
+  std::vector<idx_t> part(graph.weights.size());
   const Finally waiting = without_sigterm();
-  if (elements > 0 && vertices.count >= ranks &&
-      METIS_PartMeshNodal(&elements, &vertices.count, offsets.data(), nodes.data(), weights.data(), nullptr, &ranks,
-                          nullptr, options.data(), &cut, element_owner.data(), owner.data()) != METIS_OK)
+  if (METIS_PartGraphKway(&vertices, &constraints, graph.offsets.data(), graph.neighbours.data(), graph.weights.data(),
+                          nullptr, nullptr, &parts, nullptr, nullptr, options, &cut, part.data()) != METIS_OK)
     throw Error("METIS could not partition the mesh into " + std::to_string(ranks) + " parts");
-  for (idx_t rank = 0; rank < ranks; ++rank)
-    if (std::ranges::find(owner, rank) == owner.end()) // METIS may leave a rank empty on a small mesh
+  std::vector<int> rank(part.begin(), part.end());
+  for (int r = 0; r < ranks; ++r)
+    if (std::find(rank.begin(), rank.end(), r) == rank.end()) // METIS may leave a rank empty on a small graph
     {
-      for (idx_t v = 0; v < vertices.count; ++v) owner[v] = v * ranks / std::max(vertices.count, ranks);
+      for (idx_t v = 0; v < vertices; ++v) rank[v] = static_cast<int>(v * ranks / vertices);
       break;
     }
-  return owner;
+  return rank;
+}
+
+/// Returns the most frequent value, the smallest of several.
+int most_frequent(std::vector<int> values)
+{
+  std::sort(values.begin(), values.end());
+  int best = values.front();
+  std::ptrdiff_t most = 0;
+  for (auto it = values.begin(); it != values.end();)
+  {
+    const auto end = std::upper_bound(it, values.end(), *it);
+    if (end - it > most) most = end - it, best = *it;
+    it = end;
+  }
+  return best;
 }
 
 } // namespace
@@ -81,10 +120,16 @@ Partition partition_mesh(const Mesh& mesh, const std::vector<ContactPair>& pairs
     throw Error(std::to_string(ranks) + " ranks are too many for a model of " + std::to_string(nodes) +
                 " nodes: use at most " + std::to_string(nodes));
   const Vertices vertices = merge_pairs(nodes, pairs);
-  const std::vector<idx_t> owner = owners_of(mesh, vertices, ranks);
-  for (std::size_t i = 0; i < nodes; ++i) partition.node_rank[i] = static_cast<int>(owner[vertices.of_node[i]]);
+  std::vector<int> owner(vertices.count);
+  std::iota(owner.begin(), owner.end(), 0); // used as it is where pairs leave fewer vertices than ranks
+  if (vertices.count >= ranks) owner = partition_graph(node_graph(mesh, vertices), ranks);
+  for (std::size_t i = 0; i < nodes; ++i) partition.node_rank[i] = owner[vertices.of_node[i]];
   for (std::size_t e = 0; e < mesh.elements.size(); ++e)
-    partition.element_rank[e] = partition.node_rank[mesh.elements[e].nodes.front()];
+  {
+    std::vector<int> owners;
+    for (const int node : nodes_of(mesh.elements[e])) owners.push_back(partition.node_rank[node]);
+    partition.element_rank[e] = most_frequent(owners);
+  }
   return partition;
 }
 

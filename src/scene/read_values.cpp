@@ -222,7 +222,7 @@ private:
     const std::optional<double> named = named_number(node);
     if (!named && !node.is_number()) fail(node, expected, hint_of_number(node));
     const double value = named ? *named : *node.value<double>();
-    if (!std::isfinite(value)) fail(node, expected);
+    if (!std::isfinite(value)) fail(node, "a finite number");
     need_allowed(node, Rule::any, value);
     return value;
   }

@@ -258,8 +258,8 @@ def test_numbers_are_called_by_name(tmp_path, converged):
     mass = numbers['point."the top.1".mass']
     assert mass["value"] == 0.4 and mass["known"]
     sweep = run.report["sweep"]
-    assert sweep["names"] == ['point."the top.1".mass', "on caliper"] and sweep["units"] == ["kg", "N"]
-    assert ', force.0.vector.2, names point."the top.1".mass, on caliper' in " ".join(run.printed.split())
+    assert sweep["names"] == ["point.'the top.1'.mass", "on caliper"] and sweep["units"] == ["kg", "N"]
+    assert ", force.0.vector.2, names point.'the top.1'.mass, on caliper" in " ".join(run.printed.split())
 
 
 def test_ranks_agree(explained, squeal):

@@ -294,13 +294,13 @@ def test_the_corner_loses_nothing(tmp_path):
     source = CORNER.read_text()
     (tmp_path / "scene.toml").write_text(re.sub(r"^size = \d+", "size = 3000", source, flags=re.M))
     (tmp_path / "brake.geo").write_bytes((CORNER.parent / "brake.geo").read_bytes())
-    assert TOOL.write_deck(tmp_path / "scene.toml", tmp_path / "corner.inp") == []
+    assert TOOL.write_deck(tmp_path / "scene.toml", tmp_path / "corner.inp") == ["[probe]"]
     given, (scene, left_out) = tomllib.loads(source), converted(tmp_path, (tmp_path / "corner.inp").read_text())
     assert left_out == []
     for contact in given["contact"]:
         contact.setdefault("friction", given["friction"]["coefficient"])
     given["step"] = [{**step, "name": step["name"].replace(",", "")} for step in given["step"]]
-    given["part"] = [{**part, **given["damping"]} for part in given["part"]]
+    given["part"] = [{**given["damping"], **part} for part in given["part"]]
     for table in ("part", "support", "tie", "rigid_body", "spring", "force", "pressure", "step", "contact", "modes"):
         assert plain(scene[table]) == plain(given[table]), table
 

@@ -144,7 +144,9 @@ TEST_CASE("a state of the cycle is a start from which its own period is found at
   settings.free_periods = 0;
   settings.steps_per_period = 100;
   settings.tolerance = 1e-8;
-  const LimitCycle again = cycle_of(model, settings, {}, &given);
+  CycleOptions unwatched;
+  unwatched.shooting.watched_periods = 0; // of a verdict
+  const LimitCycle again = cycle_of(model, settings, unwatched, &given);
   CHECK(again.outcome.kind == OutcomeKind::converged);
   // at most three corrections of the mode's period, Newton's steps for the rest, and the test of the half period
   CHECK(again.convergence.periods <= 8);
