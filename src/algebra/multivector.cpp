@@ -304,38 +304,7 @@ SQUEAL_INLINE void add_columns(const double* W, std::size_t size, std::size_t j,
   }
 }
 
-/// y = W x for a few rows, `some`, of a row-major matrix.
-template <class Vector, std::size_t some>
-SQUEAL_INLINE void multiply_rows(const double* W, std::size_t columns, std::size_t lanes, const double* x, double* y)
-{
-  for (std::size_t lane = 0; lane < lanes; lane += taken<Vector>)
-  {
-    Vector sums[some] = {}, some_x;
-    for (std::size_t j = 0; j < columns; ++j)
-    {
-      get(x + j * lanes + lane, some_x);
-      for (std::size_t row = 0; row < some; ++row) sums[row] += W[row * columns + j] * some_x;
-    }
-    for (std::size_t row = 0; row < some; ++row) put(sums[row], y + row * lanes + lane);
-  }
-}
-
-template <class Vector> SQUEAL_INLINE void multiply(const double* W, std::size_t rows, std::size_t columns,
-                                                    std::size_t lanes, const double* x, double* y)
-{
-  std::size_t i = 0;
-  for (; i + tile <= rows; i += tile) multiply_rows<Vector, tile>(W + i * columns, columns, lanes, x, y + i * lanes);
-  for (; i < rows; ++i) multiply_rows<Vector, 1>(W + i * columns, columns, lanes, x, y + i * lanes);
-}
-
 } // namespace
-
-SQUEAL_SIMD void dense_product(const double* W, std::size_t rows, std::size_t columns, std::size_t lanes,
-                               const double* x, double* y)
-{
-  with_vector(lanes, [&](auto vector) SQUEAL_INLINE_LAMBDA
-              { multiply<typename decltype(vector)::type>(W, rows, columns, lanes, x, y); });
-}
 
 SQUEAL_SIMD void add_symmetric_product(const double* W, std::size_t size, std::size_t columns, const double* x,
                                        double* y)

@@ -19,7 +19,7 @@ void Progress::update(double done, const std::string& note)
 {
   if (!prints_) return;
   const auto now = std::chrono::steady_clock::now();
-  const double fraction = std::clamp(done / total_, 0.0, 0.99); // work goes on while it is told
+  const double fraction = std::clamp(done / total_, 0.0, 0.99); // the stage has not ended yet
   const double elapsed = std::chrono::duration<double>(now - start_).count();
   const double remaining = fraction > 0 ? elapsed * (1 - fraction) / fraction : 0;
   const int tenth = static_cast<int>(10 * fraction + 1e-9);

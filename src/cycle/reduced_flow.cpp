@@ -75,28 +75,6 @@ ReducedState reduced_state(Vec state)
   return {entries_of(displacement(state)), entries_of(velocity(state))};
 }
 
-MatrixXd columns_of_states(std::span<const Vec> states)
-{
-  MatrixXd columns(0, 0);
-  for (std::size_t k = 0; k < states.size(); ++k)
-  {
-    const VectorXd both = stacked(reduced_state(states[k]));
-    if (k == 0) columns.resize(both.size(), static_cast<Eigen::Index>(states.size()));
-    columns.col(static_cast<Eigen::Index>(k)) = both;
-  }
-  return columns;
-}
-
-void copy_columns(const MatrixXd& columns, std::span<const Vec> states)
-{
-  const Eigen::Index size = columns.rows() / 2;
-  for (std::size_t k = 0; k < states.size(); ++k)
-  {
-    const auto column = columns.col(static_cast<Eigen::Index>(k));
-    put(ReducedState{column.head(size), column.tail(size)}, states[k]);
-  }
-}
-
 ReducedCoordinates own_coordinates()
 {
   const auto of = [](Vec x) { return stacked(reduced_state(x)); };

@@ -11,10 +11,6 @@ namespace squeal
 Owned<Vec> vector_of(const ReducedState& state);
 ReducedState reduced_state(Vec state);
 
-/// States as columns (q, v), and such columns into states.
-Eigen::MatrixXd columns_of_states(std::span<const Vec> states);
-void copy_columns(const Eigen::MatrixXd& columns, std::span<const Vec> states);
-
 /// Between motions and their coordinates (q, v) in a reduced model.
 struct ReducedCoordinates
 {

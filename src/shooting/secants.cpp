@@ -357,7 +357,7 @@ StageResult prefer_fewer_rounds(const OrbitProblem& problem, const ShootingOptio
       const OrbitProblem once{problem.flow, problem.preconditioner, copy_of(problem.equilibrium.get()),
                               period,       problem.tolerance,      problem.least_fluctuation};
       Orbit part = evaluate(once, log, found.orbit.state, period);
-      if (!(part.residual < 2e-2)) continue; // finer steps move the orbit, too
+      if (!(part.residual < 2e-2)) continue; // the shorter period has finer steps, which move the orbit
       StageResult shorter = shoot_in_full_space(once, options, log, std::move(part));
       if (shorter.ending == StageEnding::converged) found = std::move(shorter);
     }

@@ -144,8 +144,8 @@ private:
     return point.inserted ? std::max(tolerance_, large_tolerance) : tolerance_;
   }
 
-  /// The first point of a line. In the other direction of rotation its modes are those of the first point that they
-  /// can be told to be, as where friction is weak.
+  /// The first point of a line. In the other direction of rotation its modes take the tracks of those of the
+  /// first point that they match, as where friction is weak.
   void begin(Followed& now)
   {
     now.tracks.assign(now.modes.pairs.size(), -1);

@@ -55,8 +55,4 @@ void solve_transposed_triangle(const double* L, std::size_t columns, std::size_t
 /// triangle is read once.
 void add_symmetric_product(const double* W, std::size_t size, std::size_t columns, const double* x, double* y);
 
-/// y = W x for a W of rows x columns stored by rows and at least four lanes.
-void dense_product(const double* W, std::size_t rows, std::size_t columns, std::size_t lanes, const double* x,
-                   double* y);
-
 } // namespace squeal
