@@ -26,7 +26,7 @@ struct PacedDivergence
 {
   ComplexMode mode; // its eigenvalue is imaginary
   Estimate none;    // of no amplitude
-  GivenStart start; // beside the equilibrium
+  State start;      // beside the equilibrium
 };
 
 /// The motion that had settled at fewer steps a period.
@@ -51,7 +51,7 @@ struct MotionSearch
   int begin_steps = first_steps;          // a period, where the scene leaves them open
   bool ended = false;                     // the run, within a stage of the search
   bool answered = false;                  // by the orbit of the checkpoint
-  std::optional<ResumedOrbit> resumed{};  // that the run that is gone on with had reached
+  std::optional<GivenStart> resumed{};    // the orbit that the run that is gone on with had reached
   std::optional<GivenStart> settled_on{}; // what the motion settled on, at these steps
   std::optional<SettledBySteps> by_fewer_steps{};
 
@@ -76,14 +76,6 @@ std::optional<Outcome> cycle_not_sought(const SlidingPoint& point, const MotionS
   return Outcome{OutcomeKind::skipped, reason};
 }
 
-/// The state that the search starts from; null: the modes'.
-const GivenStart* given_start(const MotionSearch& search)
-{
-  if (search.settled_on) return &*search.settled_on;
-  if (search.start.given) return &*search.start.given;
-  return search.paced ? &search.paced->start : nullptr;
-}
-
 UnstableModes modes_sought(const MotionSearch& search)
 {
   const SlidingPoint& point = search.point;
@@ -93,10 +85,25 @@ UnstableModes modes_sought(const MotionSearch& search)
   return {followed_modes(point, search.scene), point.estimates};
 }
 
-CycleProblem cycle_problem(const MotionSearch& search, const CycleSettings& settings)
+/// The start of the search for a cycle: what the motion has settled on; the orbit of the checkpoint; the state that the
+/// scene names, a file or the end of the transient; beside the equilibrium where it only diverges; else the unstable
+/// modes at the amplitudes of their estimates. Nothing where contact limits none of these.
+std::optional<GivenStart> cycle_start(const MotionSearch& search, const CycleSettings& settings)
+{
+  const auto copied = [](const GivenStart& known) {
+    return GivenStart{copy_of(known.state), known.period, known.rounds};
+  };
+  if (search.settled_on) return copied(*search.settled_on);
+  if (search.resumed) return copied(*search.resumed);
+  if (search.start.given) return GivenStart{copy_of(*search.start.given)};
+  if (search.paced) return GivenStart{copy_of(search.paced->start)};
+  std::optional<State> state = state_on_modes(search.point.sliding(), modes_sought(search), settings);
+  return state ? std::optional(GivenStart{std::move(*state)}) : std::nullopt;
+}
+
+CycleProblem cycle_problem(const MotionSearch& search, const CycleSettings& settings, const GivenStart* start)
 {
   const SlidingPoint& point = search.point;
-  const GivenStart* given = given_start(search);
   return {point.sliding(),
           *point.linearised,
           point.modes.modes,
@@ -105,10 +112,7 @@ CycleProblem cycle_problem(const MotionSearch& search, const CycleSettings& sett
           search.options.step,
           search.options.modes,
           point.model->probes,
-          given ? &given->state : nullptr,
-          given ? given->period : 0,
-          given ? given->rounds : 1,
-          search.resumed ? &*search.resumed : nullptr};
+          start};
 }
 
 /// Paces the mode that diverges by its rate of growth, and starts beside the equilibrium.
@@ -129,7 +133,7 @@ PacedDivergence paced_divergence(const SlidingPoint& point)
                 diverging.backward_error};
   paced.none.outcome = {OutcomeKind::skipped, "the mode grows without vibrating", 0, 0};
   paced.none.lift_off_amplitude = paced.none.reversal_amplitude = amplitude; // what grows from there is not at rest
-  paced.start.state = mode_state(equilibrium, diverging, amplitude, 0);
+  paced.start = mode_state(equilibrium, diverging, amplitude, 0);
   return paced;
 }
 
@@ -165,26 +169,18 @@ FollowedMode mode_of_start(const SlidingPoint& point, const State& start)
   return {index, estimate_of(point, point.modes.modes[index])};
 }
 
-/// Finds the cycle by the reduced model where that may do, else by the full one, and notes each attempt.
+/// Finds the cycle, and notes each attempt.
 FittedCycle find_noted(MotionSearch& search, const std::string& name, const CycleSettings& settings)
 {
-  const CycleModel asked = search.scene.fidelity;
-  const CycleProblem problem = cycle_problem(search, settings);
-  const auto noted = [&](FittedCycle fitted, const char* model)
-  {
-    search.found.attempts.push_back({name + model, fitted.fidelity.verdict_steps, fitted.cycle.outcome});
-    return fitted;
+  const std::optional<GivenStart> start = cycle_start(search, settings);
+  FittedCycle fitted = find_fitted_cycle(cycle_problem(search, settings, start ? &*start : nullptr), search.request(),
+                                         search.options.cycle);
+  const auto note = [&](const char* model, const Outcome& outcome) {
+    search.found.attempts.push_back({name + model, fitted.fidelity.verdict_steps, outcome});
   };
-  Fidelity tried;
-  if (asked == CycleModel::automatic) tried.reason = no_reduced_search(problem);
-  if (asked == CycleModel::reduced || (asked == CycleModel::automatic && tried.reason.empty()))
-  {
-    FittedCycle fitted =
-        noted(find_on_reduced_model(problem, search.request(), search.options.cycle), ", reduced model");
-    if (fitted.answers) return fitted;
-    tried = fitted.fidelity;
-  }
-  return noted(find_on_full_model(problem, search.request(), search.options.cycle, tried), ", full model");
+  if (fitted.on_reduced) note(", reduced model", *fitted.on_reduced);
+  note(fitted.fidelity.used == CycleModel::reduced ? ", reduced model" : ", full model", fitted.cycle.outcome);
+  return fitted;
 }
 
 /// Seeks the cycle as a stage, and keeps it for a restart.
@@ -248,7 +244,7 @@ SettledMotion settled_motion(const MotionSearch& search)
   if (succeeded(cycle.outcome)) return not_run<SettledMotion>(OutcomeKind::skipped, "the cycle is the answer");
   if (!motion_goes_on(cycle, search.point.modes.unstable_count))
     return not_run<SettledMotion>(OutcomeKind::skipped, "there is no motion to go on from");
-  return find_settled_motion(cycle_problem(search, search.scene.cycle), cycle, search.options.settled);
+  return find_settled_motion(cycle_problem(search, search.scene.cycle, nullptr), cycle, search.options.settled);
 }
 
 /// Once the run is to end, there may be a settled motion that belongs to the cycle there.
@@ -305,6 +301,10 @@ void seek_from_settled(MotionSearch& search, const char* name)
   motion.settled = not_run<SettledMotion>(OutcomeKind::skipped, "it is the cycle, which is the answer");
 }
 
+/// The ways, in their order. Each decides whether it has the answer:
+/// - a cycle: its verdict is that of `judge` (shooting/orbit.cpp), by its multipliers and motions beside it. One that
+///   attracts has converged; one that repels is an unstable cycle, and the search goes on from its free motion;
+/// - a settled motion: its kind is that of `judge_motion` (settled/motion.cpp), by exponents, spectrum and energies.
 constexpr std::array ways = {
     Way{"cycle from the checkpoint", [](const MotionSearch& search) { return search.resumed.has_value(); },
         seek_from_checkpoint},
@@ -380,7 +380,7 @@ void begin(MotionSearch& search, const StageRunner& run)
   if (search.not_sought) return;
   if (only_diverges(followed_modes(point, search.scene))) search.paced = paced_divergence(point);
   if (point.modes.unstable_count == 0) // the equilibrium is stable, so that the start is given
-    search.found.followed = mode_of_start(point, search.start.given->state);
+    search.found.followed = mode_of_start(point, *search.start.given);
   search.resumed = kept_cycle(point.model->structure);
 }
 
@@ -392,9 +392,9 @@ MotionStart motion_start(const SlidingPoint& point, const Scene& scene, const Tr
   MotionStart start;
   if (!scene.cycle.enabled) return start;
   if (kind == CycleStartKind::file)
-    start.given = GivenStart{read_state(scene.cycle.start.file, point.model->structure)};
+    start.given = read_state(scene.cycle.start.file, point.model->structure);
   else if (kind == CycleStartKind::transient && transient.outcome.kind == OutcomeKind::completed)
-    start.given = GivenStart{copy_of(transient.end)};
+    start.given = copy_of(transient.end);
   else if (kind == CycleStartKind::transient)
     start.missing = "the transient that it starts from the end of was not completed";
   return start;

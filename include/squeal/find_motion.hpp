@@ -11,7 +11,7 @@ namespace squeal
 /// The start that the scene gives the search, if it is not the modes.
 struct MotionStart
 {
-  std::optional<GivenStart> given;
+  std::optional<State> given;
   std::string missing; // why it is not there; empty if it is
 };
 

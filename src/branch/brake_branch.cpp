@@ -51,7 +51,6 @@ struct BrakeAt
   Equilibrium equilibrium{};
   bool equilibrium_known = false;
   CycleProblem problem; // with the modes of the scene's own value
-  std::shared_ptr<const ReducedModel> recorded{};
   PeriodMap map;
   Flow flow; // of the map
 };
@@ -100,8 +99,8 @@ public:
     {
       (void)equilibrium();
       at_->problem.reduced = nullptr;
-      inverse_ = [at = at_, by_record = recorded_preconditioner(at_->problem, at_->map, at_->recorded)](
-                     double period, Vec x, Vec y) { by_record(period, x, y); };
+      inverse_ = [at = at_, by_record = recorded_preconditioner(at_->problem, at_->map)](double period, Vec x, Vec y)
+      { by_record(period, x, y); };
     };
     return family;
   }
@@ -170,7 +169,7 @@ private:
   PointMeasures measure(const Orbit& orbit)
   {
     (void)equilibrium(); // energies refer to it
-    MeasuredPeriod measured = measure_period(at_->map, {problem_.own.probes, 0}, orbit.period, orbit.state, nullptr);
+    MeasuredPeriod measured = measure_period(at_->map, {problem_.own.probes, 0}, orbit.period, orbit.state);
     PointMeasures measures{measured.mean_energy, measured.mean_fluctuating_energy, std::move(measured.peak_to_peak),
                            measured.open_pairs_mean};
     count_statuses(measured.statuses, measures);

@@ -1,13 +1,10 @@
 #include "squeal/cycle/fidelity.hpp"
 
 #include "reduced_cycle.hpp"
-#include "squeal/cycle/preconditioner.hpp"
 #include "step_refinement.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <memory>
 
 namespace squeal
 {
@@ -16,13 +13,6 @@ namespace
 {
 
 constexpr int plain_steps = 100; // a period of a model that the scene names
-
-/// What sets the number of steps a period.
-enum class StepChoice
-{
-  given,       // the scene, or a plain number
-  by_accuracy, // the accuracy that the scene asks for
-};
 
 /// Why theta and the steps a period would give misleading growth; empty if they would not.
 std::string step_refusal_of(const CycleProblem& problem, int steps_per_period)
@@ -34,90 +24,75 @@ std::string step_refusal_of(const CycleProblem& problem, int steps_per_period)
 }
 
 /// The reduced model's cycle itself, with its verdict and what one period of the full model says of it.
-LimitCycle measured_on_full_model(const CycleCorrection& correction, const ShootingStart& start)
+LimitCycle measured_on_full_model(CycleProblem& problem, CycleOptions options, const ShootingStart& start)
 {
-  CycleSettings settings = correction.problem.settings;
-  CycleOptions options = correction.options;
-  settings.tolerance = std::numeric_limits<double>::max(); // no correction follows
   options.shooting.finish = Finish::none;
   options.shooting.max_periods = 1; // nor a motion beside it, which would not begin beside a cycle of the full model
   LimitCycle cycle =
-      find_cycle_from(with_settings(correction.problem, settings), options, start, &correction.preconditioner, 0);
+      find_cycle_from(problem, options, start, {std::numeric_limits<double>::max()}); // no correction follows
   cycle.tolerance = 0;
   return cycle;
 }
 
-/// Notes the errors of a cycle whose steps are given.
-void note_model_errors(const CycleCorrection& correction, FittedCycle& found)
+/// Why no reduced model leads to the cycle that is sought; empty if one may.
+std::string no_reduced_search(const CycleProblem& problem, CycleModel asked)
 {
-  const RelativeChange errors = model_errors_of(correction, found.cycle.orbit);
-  found.fidelity.frequency_error = errors.frequency;
-  found.fidelity.energy_error = errors.energy;
+  if (problem.unstable.modes.size() > 1)
+    return "several modes are unstable: only the full model's shooting excites them all";
+  if (asked == CycleModel::automatic && problem.start && problem.start->period > 0)
+    return "the search starts from a cycle that is nearly known, which the full model takes up at once";
+  return {};
 }
 
-/// The full model's cycle from the reduced model's, whose derivative is the preconditioner, and the finer steps that
-/// the accuracy needs. It does not answer where that shooting left the reduced cycle.
-FittedCycle correct_on_full_model(const ReducedSearch& search, const ReducedCycle& reduced, StepChoice steps)
+/// The cycle of the full model from the reduced model's, or that one itself where it was asked for. Returns why there
+/// is none, or nothing.
+std::string find_by_reduced_model(CycleProblem& problem, const CycleOptions& options, FittedCycle& found)
 {
-  CycleProblem problem = search.problem;
-  problem.reduced = &search.model;
-  const Preconditioner preconditioner =
-      preconditioner_of(search.correction, coordinates_in(search.model, problem.sliding.structure));
+  Fidelity& fidelity = found.fidelity;
+  const bool asked = fidelity.asked == CycleModel::reduced;
+  if (const std::string reason = no_reduced_search(problem, fidelity.asked); !reason.empty()) return reason;
+  fidelity.used = CycleModel::reduced;
+  // a start need not be better than 1e-3; slow motions multiply it
+  ReducedSearch search{problem, options, fidelity, asked ? 3e-4 * fidelity.accuracy : 1e-3};
+  ReducedCycle reduced;
+  if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty()) return reason;
+  const double clock = MPI_Wtime();
   const Owned<Vec> state = full_motion(search, reduced.state);
   check(VecAXPY(displacement(state), 1, problem.sliding.equilibrium.u));
   ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), reduced.period};
   start.is_cycle = true;
-  const CycleCorrection correction{problem, search.options, preconditioner};
-  FittedCycle found{{}, search.fidelity};
   LimitCycle& cycle = found.cycle;
-  const bool asked = found.fidelity.asked == CycleModel::reduced;
-  if (asked)
-    cycle = measured_on_full_model(correction, start);
-  else if (problem.resumed)
-    cycle = find_cycle_from_resumed(problem, search.options, &preconditioner);
-  else
-    cycle = find_cycle_from(problem, search.options, start, &preconditioner, 0);
-  found.fidelity.full_periods = cycle.convergence.periods;
-  if (cycle.cut_short) return found;
+  cycle = asked ? measured_on_full_model(problem, options, start)
+                : find_cycle_from(problem, options, start, {problem.settings.tolerance});
+  fidelity.full_periods = cycle.convergence.periods;
+  fidelity.full_seconds += MPI_Wtime() - clock;
+  if (cycle.cut_short) return {};
   const OutcomeKind kind = cycle.outcome.kind;
-  found.answers = asked || (kind != OutcomeKind::collapsed_to_equilibrium && kind != OutcomeKind::not_periodic);
-  if (!found.answers) found.fidelity.reason = "the full model's shooting from the reduced model's cycle left it";
-  if (kind == OutcomeKind::converged && steps == StepChoice::by_accuracy && !asked)
-    return refine_steps(correction, std::move(found));
-  if (asked || kind == OutcomeKind::converged) note_model_errors(correction, found); // else the free motion went on
-  return found;
+  if (!asked && (kind == OutcomeKind::collapsed_to_equilibrium || kind == OutcomeKind::not_periodic))
+    return "the full model's shooting from the reduced model's cycle left it";
+  if (!asked && kind != OutcomeKind::converged) return {}; // the free motion went on
+  fidelity.frequency_error = cycle.remaining.frequency;
+  fidelity.energy_error = cycle.remaining.energy;
+  if (!fidelity.chooses_steps) estimate_reduced_step_errors(search, reduced);
+  return {};
 }
 
-constexpr const char* several_modes = "several modes are unstable: only the full model's shooting excites them all";
-
-/// No cycle of the reduced model, for a reason: the full model follows unless the reduced one was asked for.
-FittedCycle without_cycle(const ReducedSearch& search, const std::string& reason)
+/// The same, where no reduced model can be made, too.
+std::string try_reduced_model(CycleProblem& problem, const CycleOptions& options, FittedCycle& found)
 {
-  FittedCycle none{{}, search.fidelity, search.fidelity.asked == CycleModel::reduced};
-  none.fidelity.reason = reason;
-  const bool several = search.problem.unstable.modes.size() > 1;
-  none.cycle.outcome = {several ? OutcomeKind::refused : OutcomeKind::not_converged, reason, 0, 0};
-  none.cycle.orbit.residual = std::nan(""); // no period of the full model was made
-  return none;
-}
-
-/// The cycle by way of the reduced model's.
-FittedCycle find_by_reduced_model(ReducedSearch& search, StepChoice steps)
-{
-  if (search.problem.unstable.modes.size() > 1) return without_cycle(search, several_modes);
-  ReducedCycle reduced;
-  if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty())
-    return without_cycle(search, reason);
-  const double clock = MPI_Wtime();
-  FittedCycle found = correct_on_full_model(search, reduced, steps);
-  found.fidelity.full_seconds += MPI_Wtime() - clock;
-  search.fidelity = found.fidelity;
-  if (!found.answers) return without_cycle(search, found.fidelity.reason);
-  const bool converged =
-      search.fidelity.asked == CycleModel::reduced || found.cycle.outcome.kind == OutcomeKind::converged;
-  if (converged && steps == StepChoice::given && !found.cycle.cut_short) estimate_reduced_step_errors(search, reduced);
-  found.fidelity = search.fidelity;
-  return found;
+  try
+  {
+    return find_by_reduced_model(problem, options, found);
+  }
+  catch (const LibraryError&) // perhaps on this rank alone
+  {
+    throw;
+  }
+  catch (const Error& error) // on every rank alike: the reduced model is the same on all
+  {
+    if (found.fidelity.asked == CycleModel::reduced) throw;
+    return error.what();
+  }
 }
 
 /// The settings, with steps and tolerance where the scene leaves them open.
@@ -127,7 +102,8 @@ CycleSettings chosen_settings(const CycleProblem& problem, const FidelityRequest
   const bool chooses = request.model == CycleModel::automatic;
   if (settings.tolerance == 0) settings.tolerance = plain_tolerance;
   if (settings.steps_per_period > 0) return settings;
-  const double turns = problem.given_period * problem.unstable.modes.front().frequency_hz(); // of the mode, if given
+  const double known = problem.start ? problem.start->period : 0,
+               turns = known * problem.unstable.modes.front().frequency_hz(); // of the mode
   settings.steps_per_period =
       (chooses ? request.begin_steps : plain_steps) * std::max(1, static_cast<int>(std::lround(turns)));
   if (chooses)
@@ -136,95 +112,64 @@ CycleSettings chosen_settings(const CycleProblem& problem, const FidelityRequest
   return settings;
 }
 
-/// Lets `search` find the cycle with the chosen settings, unless these are refused. A cycle that answers is saved.
-FittedCycle
-find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, Fidelity fidelity,
-                  const std::function<FittedCycle(const CycleProblem&, StepChoice, const Fidelity&)>& search)
+/// The account of the search before it begins.
+Fidelity begun(const CycleProblem& given, const FidelityRequest& request, int steps)
 {
-  declare_solver_options(comm_of(given.sliding.structure.load));
-  const CycleSettings settings = chosen_settings(given, request);
-  const CycleProblem problem = with_settings(given, settings);
-  if (const std::string refusal = step_refusal_of(problem, settings.steps_per_period); !refusal.empty())
-  {
-    FittedCycle refused;
-    refused.cycle.outcome = {OutcomeKind::refused, refusal, 0, 0};
-    return refused;
-  }
+  Fidelity fidelity;
   fidelity.asked = request.model;
   fidelity.accuracy = request.accuracy;
   if (request.model != CycleModel::full) fidelity.contact_tolerance = 1e-3 * request.accuracy;
-  fidelity.verdict_steps = settings.steps_per_period;
+  fidelity.verdict_steps = steps;
   fidelity.chooses_steps = request.model == CycleModel::automatic && given.settings.steps_per_period == 0;
-  FittedCycle result = search(problem, fidelity.chooses_steps ? StepChoice::by_accuracy : StepChoice::given, fidelity);
-  if (!result.answers) return result;
-  result.fidelity.steps_per_period = result.cycle.steps_per_period;
-  const State& start = result.cycle.measured.start;
-  const std::filesystem::path& file = settings.save_state;
-  if (!file.empty() && start.u.get()) write_state(start, problem.sliding.structure, file);
-  return result;
+  return fidelity;
 }
 
 } // namespace
 
-std::string no_reduced_search(const CycleProblem& problem)
+FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, const CycleOptions& options)
 {
-  if (problem.unstable.modes.size() > 1) return several_modes;
-  return problem.given_period > 0
-             ? "the search starts from a cycle that is nearly known, which the full model takes up at once"
-             : "";
-}
-
-FittedCycle find_on_reduced_model(const CycleProblem& given, const FidelityRequest& request,
-                                  const CycleOptions& options)
-{
-  const auto search = [&](const CycleProblem& problem, StepChoice steps, const Fidelity& fidelity)
+  declare_solver_options(comm_of(given.sliding.structure.load));
+  CycleProblem problem = with_settings(given, chosen_settings(given, request));
+  const CycleSettings& settings = problem.settings;
+  FittedCycle found;
+  LimitCycle& cycle = found.cycle;
+  if (const std::string refusal = step_refusal_of(problem, settings.steps_per_period); !refusal.empty())
   {
-    const bool asked = fidelity.asked == CycleModel::reduced;
-    ReducedSearch reduced{problem, options, fidelity, problem.settings.steps_per_period};
-    reduced.fidelity.used = CycleModel::reduced;
-    reduced.tolerance = asked ? 3e-4 * fidelity.accuracy : 1e-3; // a start need not be better; slow motions multiply it
-    try
-    {
-      return find_by_reduced_model(reduced, steps);
-    }
-    catch (const LibraryError&) // perhaps on this rank alone
-    {
-      throw;
-    }
-    catch (const Error& error) // on every rank alike: the reduced model is the same on all
-    {
-      if (asked) throw;
-      return without_cycle(reduced, error.what());
-    }
-  };
-  return find_fitted_cycle(given, request, {}, search);
-}
-
-FittedCycle find_on_full_model(const CycleProblem& given, const FidelityRequest& request, const CycleOptions& options,
-                               const Fidelity& tried)
-{
-  const auto search = [&](const CycleProblem& problem, StepChoice steps, const Fidelity& fidelity)
+    cycle.outcome = {OutcomeKind::refused, refusal, 0, 0};
+    return found;
+  }
+  Fidelity& fidelity = found.fidelity = begun(given, request, settings.steps_per_period);
+  const bool on_full = request.model == CycleModel::full;
+  if (!on_full) fidelity.reason = try_reduced_model(problem, options, found);
+  if (!on_full && !fidelity.reason.empty())
+  {
+    const bool several = problem.unstable.modes.size() > 1;
+    cycle = {};
+    cycle.outcome = {several ? OutcomeKind::refused : OutcomeKind::not_converged, fidelity.reason, 0, 0};
+    cycle.orbit.residual = std::nan(""); // no period of the full model was made
+    if (request.model == CycleModel::reduced) return found;
+    if (fidelity.used == CycleModel::reduced) found.on_reduced = cycle.outcome;
+  }
+  if (on_full || !fidelity.reason.empty())
+  {
+    problem.reduced.reset();
+    fidelity.used = CycleModel::full;
+    const double clock = MPI_Wtime();
+    const long before = fidelity.full_periods; // of a search that stalled
+    cycle = find_cycle_from_start(problem, options);
+    fidelity.full_periods = cycle.convergence.periods += before;
+    fidelity.full_seconds += MPI_Wtime() - clock;
+  }
+  if (fidelity.chooses_steps && cycle.outcome.kind == OutcomeKind::converged && !cycle.cut_short)
   {
     const double clock = MPI_Wtime();
-    FittedCycle found{find_cycle_from_start(problem, options), fidelity};
-    found.fidelity.used = CycleModel::full;
-    found.cycle.convergence.periods += fidelity.full_periods; // of a search that stalled
-    found.fidelity.full_periods = found.cycle.convergence.periods;
-    if (steps == StepChoice::by_accuracy && !found.cycle.cut_short &&
-        found.cycle.outcome.kind == OutcomeKind::converged)
-    {
-      PeriodMap map{problem.sliding, problem.step, found.cycle.steps_per_period, found.cycle.theta};
-      map.reactions = problem.sliding.equilibrium.reactions;
-      std::shared_ptr<const ReducedModel> kept;
-      CycleProblem with_model = problem;
-      const Preconditioner preconditioner = recorded_preconditioner(with_model, map, kept);
-      record_period(map, found.cycle.orbit.period, found.cycle.orbit.state, {});
-      found = refine_steps({with_model, options, preconditioner}, std::move(found));
-    }
-    found.fidelity.full_seconds += MPI_Wtime() - clock;
-    return found;
-  };
-  return find_fitted_cycle(given, request, tried, search);
+    refine_steps(problem, options, found);
+    fidelity.full_seconds += MPI_Wtime() - clock;
+  }
+  fidelity.steps_per_period = cycle.steps_per_period;
+  const State& start = cycle.measured.start;
+  if (!settings.save_state.empty() && start.u.get()) write_state(start, problem.sliding.structure, settings.save_state);
+  return found;
 }
 
 } // namespace squeal

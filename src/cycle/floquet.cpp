@@ -166,8 +166,7 @@ recorded_model(const CycleProblem& problem, std::span<const std::vector<StepReco
 {
   const Interface& interface = problem.sliding.interface;
   const std::vector<PairHistory> pairs = histories(interface, periods);
-  if (problem.reduced && holds(*problem.reduced, pairs, interface))
-    return {std::shared_ptr<const ReducedModel>(), problem.reduced}; // borrowed
+  if (problem.reduced && holds(*problem.reduced, pairs, interface)) return problem.reduced;
   std::size_t steps = 0;
   for (const auto& records : periods) steps += records.size();
   const PairRoles roles = roles_of(pairs, interface, steps);
@@ -283,12 +282,13 @@ namespace
 /// The correction and the function that applies P^-1 by it.
 struct RecordedInverse
 {
-  MonodromyCorrection correction;
-  Preconditioner apply; // borrows the correction; empty: none
+  std::shared_ptr<const ReducedModel> model; // whose coordinates these are
+  MonodromyCorrection correction{};
+  Preconditioner apply{}; // borrows both; empty: none
 };
 
 /// From the period that the map recorded last. Integrated once more, it gives the flow.
-void make(CycleProblem& problem, PeriodMap& map, std::shared_ptr<const ReducedModel>& kept, RecordedInverse& inverse)
+void make(CycleProblem& problem, PeriodMap& map, RecordedInverse& inverse)
 {
   if (!map.recorded_start.get() || problem.modes.empty()) return;
   if (!(problem.modes.front().frequency_hz() > 0)) return; // a mode that only diverges is no scale of a basis
@@ -298,22 +298,22 @@ void make(CycleProblem& problem, PeriodMap& map, std::shared_ptr<const ReducedMo
   try
   {
     std::string missing;
-    kept = recorded_model(problem, std::span(&map.records, 1), missing);
-    if (!kept) return;
-    ReducedMap own{*kept, map.steps, map.theta, comm_of(problem.sliding.structure.load)};
-    const auto contacts = recorded_contacts(*kept, problem.sliding.interface.directions, map.records);
-    const ReducedState flow = coordinates(*kept, problem.sliding.structure, displacement(rate), velocity(rate));
-    inverse.correction = monodromy_correction(*kept, monodromy(own, period, contacts), flow);
-    problem.reduced = kept.get();
-    inverse.apply = preconditioner_of(inverse.correction, coordinates_in(*kept, problem.sliding.structure));
+    inverse.model = recorded_model(problem, std::span(&map.records, 1), missing);
+    if (!inverse.model) return;
+    const ReducedModel& model = *inverse.model;
+    ReducedMap own{model, map.steps, map.theta, comm_of(problem.sliding.structure.load)};
+    const auto contacts = recorded_contacts(model, problem.sliding.interface.directions, map.records);
+    const ReducedState flow = coordinates(model, problem.sliding.structure, displacement(rate), velocity(rate));
+    inverse.correction = monodromy_correction(model, monodromy(own, period, contacts), flow);
+    inverse.apply = preconditioner_of(inverse.correction, coordinates_in(model, problem.sliding.structure));
+    problem.reduced = inverse.model;
   }
   catch (const LibraryError&) // perhaps on this rank alone
   {
     throw;
   }
-  catch (const Error&) // on every rank alike
+  catch (const Error&) // on every rank alike: none can be made
   {
-    kept.reset();
   }
 }
 
@@ -327,14 +327,14 @@ RealModes real_modes_beyond(const CycleProblem& problem, double highest)
   return find_real_modes_between(problem.linearised, end, highest, problem.modes_options);
 }
 
-Preconditioner recorded_preconditioner(CycleProblem& problem, PeriodMap& map, std::shared_ptr<const ReducedModel>& kept)
+Preconditioner recorded_preconditioner(CycleProblem& problem, PeriodMap& map)
 {
-  return [&problem, &map, &kept, inverse = std::shared_ptr<RecordedInverse>()](double period, Vec x, Vec y) mutable
+  return [&problem, &map, inverse = std::shared_ptr<RecordedInverse>()](double period, Vec x, Vec y) mutable
   {
     if (!inverse)
     {
       inverse = std::make_shared<RecordedInverse>();
-      make(problem, map, kept, *inverse);
+      make(problem, map, *inverse);
     }
     apply(inverse->apply, period, x, y);
   };

@@ -255,7 +255,7 @@ std::vector<OffsetSpread> spread_over_offsets(const CycleAtOffsets& at)
     const StageResult found =
         shoot_once(at.problem, at.options, at.log, evaluate(at.problem, at.log, start, at.orbit.period));
     if (found.ending != StageEnding::converged || found.orbit.offsets.held != at.orbit.offsets.held) continue;
-    const MeasuredPeriod there = measure_period(map, {}, found.orbit.period, found.orbit.state, nullptr);
+    const MeasuredPeriod there = measure_period(map, {}, found.orbit.period, found.orbit.state);
     spreads.push_back(spread_between(at, found.orbit, there, step));
     spreads.back().contact = moved.contact;
     spreads.back().direction = moved.direction;

@@ -43,9 +43,9 @@ void describe_orbit(Checkpoint& checkpoint, const Structure& structure, const st
 
 } // namespace
 
-std::optional<ResumedOrbit> kept_cycle(const Structure& structure)
+std::optional<GivenStart> kept_cycle(const Structure& structure)
 {
-  ResumedOrbit orbit{{zeros_like(structure.load), zeros_like(structure.load), 0, {}}};
+  GivenStart orbit{{zeros_like(structure.load), zeros_like(structure.load), 0, {}}};
   const auto describe = [&](Checkpoint& checkpoint) {
     describe_orbit(checkpoint, structure, {orbit.state.u, orbit.state.v}, orbit.period);
   };
@@ -124,43 +124,28 @@ void add_remedies(const PeriodMap& map, Outcome& outcome)
 
 } // namespace
 
-LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
-                           const Preconditioner* preconditioner, int free_periods)
+LimitCycle find_cycle_from(CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
+                           const ShootingSettings& settings)
 {
-  const CycleSettings& settings = problem.settings;
-  PeriodMap map{problem.sliding, problem.step, settings.steps_per_period, settings.theta};
+  const int steps = problem.settings.steps_per_period;
+  PeriodMap map{problem.sliding, problem.step, steps, problem.settings.theta};
   map.reactions = problem.sliding.equilibrium.reactions;
-  map.keeps_step = is_dear(map.steps * work_of_step(problem.sliding.structure));
+  map.keeps_step = is_dear(steps * work_of_step(problem.sliding.structure));
   Flow flow = flow_of(map);
-  std::shared_ptr<const ReducedModel> recorded;
-  CycleProblem with_model = problem;
-  const Preconditioner by_record = recorded_preconditioner(with_model, map, recorded),
-                       &inverse = preconditioner ? *preconditioner : by_record;
-  add_slow_motions(with_model, map, steps_to_compare(problem.sliding.structure, map.steps), flow);
+  const Preconditioner preconditioner = recorded_preconditioner(problem, map);
+  add_slow_motions(problem, map, steps_to_compare(problem.sliding.structure, steps), flow);
   keep_cycles_of(flow, problem.sliding.structure);
-  ShootingResult found = shoot(flow, inverse, start, {settings.tolerance, free_periods}, options.shooting);
-  LimitCycle cycle{std::move(found.outcome),
-                   settings.steps_per_period,
-                   settings.tolerance,
-                   settings.theta,
-                   std::move(found.orbit),
-                   std::move(found.convergence),
-                   std::move(found.multipliers),
-                   {},
-                   {},
-                   {},
-                   found.cut_short};
-  cycle.free = std::move(found.free);
+  LimitCycle cycle{shoot(flow, preconditioner, start, settings, options.shooting), steps, settings.tolerance,
+                   problem.settings.theta};
   const Finally last_period = undisturbed();
-  cycle.measured =
-      measure_period(map, {problem.probes, options.samples}, cycle.orbit.period, cycle.orbit.state, nullptr);
+  cycle.measured = measure_period(map, {problem.probes, options.samples}, cycle.orbit.period, cycle.orbit.state);
   ++cycle.convergence.periods;
   if (cycle.outcome.kind == OutcomeKind::converged && cycle.orbit.offsets.held > 0 &&
       whole_tangent_is_cheap(2. * dofs_of(cycle.orbit.state)))
   {
     Progress progress(comm_of(start.u), "cycle, offsets", 1);
     ConvergenceLog log{progress};
-    const OrbitProblem found_again = problem_of(flow, inverse, start, settings.tolerance);
+    const OrbitProblem found_again = problem_of(flow, preconditioner, start, problem.settings.tolerance);
     cycle.spreads = spread_over_offsets({map, found_again, options.shooting, log, cycle.orbit, cycle.measured});
   }
   cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};
@@ -180,29 +165,18 @@ CycleProblem with_settings(CycleProblem problem, const CycleSettings& settings)
   return problem;
 }
 
-std::vector<State> other_unstable_motions(const CycleProblem& problem)
+std::optional<State> state_on_modes(const SlidingEquilibrium& sliding, const UnstableModes& unstable,
+                                    const CycleSettings& settings)
 {
-  const UnstableModes& unstable = problem.unstable;
-  std::vector<State> motions;
-  for (std::size_t i = 1; i < unstable.modes.size(); ++i)
-    if (auto motion = estimated_motion(problem.sliding.equilibrium, unstable.modes[i], unstable.estimates[i]))
-      motions.push_back(std::move(*motion));
-  return motions;
-}
-
-std::optional<State> cycle_start(const CycleProblem& problem)
-{
-  const CycleStartKind kind = problem.settings.start.kind;
-  if (problem.given) return copy_of(*problem.given);
-  const ComplexMode& mode = problem.unstable.modes.front();
-  const Estimate& estimate = problem.unstable.estimates.front();
+  const Estimate& estimate = unstable.estimates.front();
+  const bool alone = settings.start.kind == CycleStartKind::mode;
   double amplitude = estimate.start_amplitude;
-  if (kind == CycleStartKind::mode)
-    amplitude = problem.settings.amplitude > 0 ? problem.settings.amplitude : 2 * estimate.lift_off_amplitude;
+  if (alone) amplitude = settings.amplitude > 0 ? settings.amplitude : 2 * estimate.lift_off_amplitude;
   if (!(amplitude > 0) || !std::isfinite(amplitude)) return {};
-  State start = mode_state(problem.sliding.equilibrium, mode, amplitude, estimate.phase);
-  if (kind == CycleStartKind::mode) return start;
-  for (const State& motion : other_unstable_motions(problem)) add_motion(motion, 1, start);
+  State start = mode_state(sliding.equilibrium, unstable.modes.front(), amplitude, estimate.phase);
+  for (std::size_t i = 1; !alone && i < unstable.modes.size(); ++i)
+    if (const auto motion = estimated_motion(sliding.equilibrium, unstable.modes[i], unstable.estimates[i]))
+      add_motion(*motion, 1, start);
   return start;
 }
 
@@ -211,23 +185,12 @@ double equivalent_amplitude(const CycleProblem& problem, const State& state)
   return fluctuation_norm(problem, state) / unit_norm(problem);
 }
 
-LimitCycle find_cycle_from_resumed(const CycleProblem& problem, const CycleOptions& options,
-                                   const Preconditioner* preconditioner)
+LimitCycle find_cycle_from_start(CycleProblem& problem, const CycleOptions& options)
 {
-  const ResumedOrbit& orbit = *problem.resumed;
-  ShootingStart start{problem.sliding.equilibrium.u, orbit.state.u, orbit.state.v, orbit.period};
-  start.is_cycle = true;
-  return find_cycle_from(problem, options, start, preconditioner, 0);
-}
-
-LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions& options)
-{
-  if (problem.resumed) return find_cycle_from_resumed(problem, options, nullptr);
   const ComplexMode& mode = problem.unstable.modes.front();
-  const Estimate& estimate = problem.unstable.estimates.front();
+  const CycleSettings& settings = problem.settings;
   const Equilibrium& equilibrium = problem.sliding.equilibrium;
-  const std::optional<State> first = cycle_start(problem);
-  if (!first || mode.lambda.imag() == 0)
+  if (!problem.start || mode.lambda.imag() == 0)
   {
     LimitCycle skipped;
     skipped.outcome = {OutcomeKind::skipped,
@@ -235,19 +198,18 @@ LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions
                        std::nan("")};
     return skipped;
   }
-  const double limited_from = first_event(estimate) * unit_norm(problem);
-  const bool is_cycle = problem.given_period > 0; // it needs no free periods
+  const auto& [state, period, rounds] = *problem.start;
+  const bool is_cycle = period > 0; // it needs no free periods
   ShootingStart start{equilibrium.u,
-                      first->u,
-                      first->v,
-                      is_cycle ? problem.given_period : 1 / mode.frequency_hz(),
+                      state.u,
+                      state.v,
+                      is_cycle ? period : 1 / mode.frequency_hz(),
                       {mode.real, mode.imaginary, equilibrium.u},
-                      {},
-                      limited_from,
+                      problem.unstable.modes.size() - 1,
+                      first_event(problem.unstable.estimates.front()) * unit_norm(problem),
                       is_cycle,
-                      problem.given_rounds};
-  start.other_unstable = problem.unstable.modes.size() - 1;
-  return find_cycle_from(problem, options, start, nullptr, is_cycle ? 0 : problem.settings.free_periods);
+                      rounds};
+  return find_cycle_from(problem, options, start, {settings.tolerance, is_cycle ? 0 : settings.free_periods});
 }
 
 } // namespace squeal

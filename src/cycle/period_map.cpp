@@ -47,13 +47,7 @@ bool contact_is_too_loose(const PeriodMap& map)
   return map.step.contact.tolerance > std::max(map.options.contact.tolerance, neglected * map.kept.moved);
 }
 
-} // namespace
-
-void set_period(PeriodMap& map, double period)
-{
-  set_step(map, period / map.steps);
-}
-
+/// Turns `rate`, which holds x_(N-1), into dPhi/dT. `end`, the state x_N, goes a step on.
 void complete_rate(PeriodMap& map, StepWork& work, State& end, Vec rate)
 {
   const double half = 0.5 / map.step.h;
@@ -62,9 +56,6 @@ void complete_rate(PeriodMap& map, StepWork& work, State& end, Vec rate)
   check(VecAXPBY(displacement(rate), half, -half, end.u));
   check(VecAXPBY(velocity(rate), half, -half, end.v));
 }
-
-namespace
-{
 
 /// Makes room for the records of a period from this start.
 void begin_record(PeriodMap& map, Vec start)
@@ -144,6 +135,11 @@ void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rat
 
 } // namespace
 
+void set_period(PeriodMap& map, double period)
+{
+  set_step(map, period / map.steps);
+}
+
 void move_by_part(const PeriodMap& map, double part, State& state)
 {
   State next = copy_of(state);
@@ -197,26 +193,21 @@ void apply_tangent(const PeriodMap& map, std::span<const Vec> states)
 
 } // namespace
 
-void add_tangent(PeriodMap& map, Flow& flow)
-{
-  flow.record_period = [&map](double period, Vec start, const TimeGrid& grid)
-  { record_period(map, period, start, grid); };
-  flow.apply_tangent = [&map](std::span<const Vec> states) { apply_tangent(map, states); };
-  if (!has_undriven_pairs(map.sliding.interface)) return;
-  flow.offsets.motion = [&map] { return map.joints.slip; };
-  flow.offsets.find_rest = [&map](Vec rest)
-  { check(VecCopy(map.rest.about(map.sliding).equilibrium.u, displacement(rest))); };
-  flow.offsets.without_held = [&map](Vec part)
-  { take_out_tangents(map.sliding.interface, held_pairs(map.sliding.interface, map.records), part); };
-}
-
 Flow flow_of(PeriodMap& map)
 {
   const auto integrate = [&map](double period, Vec start, Vec end, Vec rate)
   { integrate_period(map, period, start, end, rate); };
   Flow flow{integrate, map.sliding.structure.M, map.sliding.structure.K};
   flow.work = map.steps * work_of_step(map.sliding.structure);
-  add_tangent(map, flow);
+  flow.record_period = [&map](double period, Vec start, const TimeGrid& grid)
+  { record_period(map, period, start, grid); };
+  flow.apply_tangent = [&map](std::span<const Vec> states) { apply_tangent(map, states); };
+  if (!has_undriven_pairs(map.sliding.interface)) return flow;
+  flow.offsets.motion = [&map] { return map.joints.slip; };
+  flow.offsets.find_rest = [&map](Vec rest)
+  { check(VecCopy(map.rest.about(map.sliding).equilibrium.u, displacement(rest))); };
+  flow.offsets.without_held = [&map](Vec part)
+  { take_out_tangents(map.sliding.interface, held_pairs(map.sliding.interface, map.records), part); };
   return flow;
 }
 
@@ -242,17 +233,11 @@ void summarise(MeasuredPeriod& measured)
 
 } // namespace
 
-MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double period, Vec start, Vec rate)
+MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double period, Vec start)
 {
   MeasuredPeriod measured;
   measured.start = {copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
-  measured.end = copy_of(measured.start);
-  const auto keep_for_rate = [&](const State& now)
-  {
-    check(VecCopy(now.u, displacement(rate)));
-    check(VecCopy(now.v, velocity(rate)));
-  };
-  if (rate) keep_for_rate(measured.start);
+  State end = copy_of(measured.start);
   set_period(map, period);
   const std::int64_t samples = recording.samples; // done * samples may not fit an int
   int done = 0;
@@ -271,20 +256,14 @@ MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double
     if (!records.empty()) joints.add_step(map.sliding.interface, now.reactions, measured.statuses.back());
     // evenly spread over the period whatever the two numbers
     if ((done + 1) * samples / map.steps > done * samples / map.steps) measured.displacements.push_back(copy_of(now.u));
-    if (++done + 1 == map.steps && rate) keep_for_rate(now);
+    ++done;
   };
-  const MarchSummary summary = march(map.step, map.rest.about(map.sliding), map.steps, measured.end,
+  const MarchSummary summary = march(map.step, map.rest.about(map.sliding), map.steps, end,
                                      {recording.probes, measured.history, watch, records});
   if (summary.interrupted) throw Interrupted{};
   map.unconverged += summary.unconverged;
   measured.joints = joints.result();
   note_joints(map, start);
-  if (rate)
-  {
-    State after = copy_of(measured.end);
-    StepWork work = begin_steps(map.step, map.sliding.structure, map.sliding.interface, after);
-    complete_rate(map, work, after, rate);
-  }
   summarise(measured);
   return measured;
 }

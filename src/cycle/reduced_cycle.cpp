@@ -2,11 +2,8 @@
 
 #include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/cycle/floquet.hpp"
 #include "squeal/cycle/preconditioner.hpp"
 #include "step_refinement.hpp"
-
-#include "squeal/shooting/secants.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +17,7 @@ namespace
 constexpr double margin = 1.5;          // pairs that part at this many times the motion's amplitude keep their contact
 constexpr double new_attachment = 1e-5; // an attachment shape is dropped when less than this part of it is new
 constexpr int most_free_periods = 100;  // until the reduced model's motion is periodic
-constexpr double runaway = 1e3;         // times the energy a period before: contact that was not solved feeds it
+constexpr double runaway = 100;         // times the model's amplitude: contact that was not solved feeds the motion
 
 /// Twice the fluctuating energy.
 double doubled_energy(const ReducedModel& model, const ReducedState& state)
@@ -30,8 +27,8 @@ double doubled_energy(const ReducedModel& model, const ReducedState& state)
 
 ReducedMap period_map_of(const ReducedSearch& search, int steps)
 {
-  ReducedMap map{search.model, steps, search.problem.settings.theta, comm_of(search.problem.sliding.structure.load)};
-  const std::vector<double>& still = search.model.reactions;
+  ReducedMap map{search.model(), steps, search.problem.settings.theta, comm_of(search.problem.sliding.structure.load)};
+  const std::vector<double>& still = search.model().reactions;
   map.reactions = Eigen::VectorXd::Map(still.data(), static_cast<Eigen::Index>(still.size()));
   map.contact.tolerance = search.fidelity.contact_tolerance;
   return map;
@@ -51,11 +48,11 @@ double mean_energy(ReducedMap& map, double period, const ReducedState& start)
 void describe_model(ReducedSearch& search)
 {
   Fidelity& fidelity = search.fidelity;
-  fidelity.size = search.model.size();
-  fidelity.modes = search.model.modes;
-  fidelity.attachment_shapes = search.model.attachments;
-  fidelity.left_out_shapes = search.model.left_out;
-  fidelity.lost_compliance = search.model.lost_compliance;
+  fidelity.size = search.model().size();
+  fidelity.modes = search.model().modes;
+  fidelity.attachment_shapes = search.model().attachments;
+  fidelity.left_out_shapes = search.model().left_out;
+  fidelity.lost_compliance = search.model().lost_compliance;
   fidelity.active_pairs = static_cast<int>(search.active.size());
   fidelity.sliding_pairs = 0;
   for (int pair = 0; pair < search.problem.sliding.interface.pairs; ++pair)
@@ -69,8 +66,9 @@ void describe_model(ReducedSearch& search)
 double highest_joining(const ReducedSearch& search)
 {
   constexpr int long_period = 128; // steps
-  const bool dear = is_dear(search.steps * work_of_step(search.problem.sliding.structure));
-  const double factor = dear && search.steps < long_period ? 3 : 4.5;
+  const int steps = search.problem.settings.steps_per_period;
+  const bool dear = is_dear(steps * work_of_step(search.problem.sliding.structure));
+  const double factor = dear && steps < long_period ? 3 : 4.5;
   return factor * search.problem.unstable.modes.front().frequency_hz();
 }
 
@@ -85,92 +83,50 @@ PetscInt attachments_of(const ReducedSearch& search)
 void build_model(ReducedSearch& search, double amplitude)
 {
   const double clock = MPI_Wtime();
-  const CycleProblem& problem = search.problem;
+  CycleProblem& problem = search.problem;
   // where its cycle is the answer, friction is left free
   const Interface& interface = problem.sliding.interface;
   const bool with_joints = std::ranges::any_of(search.active, [&](int pair)
                                                { return is_undriven(interface, static_cast<std::size_t>(pair)); });
   const bool sliding = search.fidelity.asked != CycleModel::reduced && !with_joints &&
                        pairs_that_may_turn(interface, problem.unstable.modes.front(), amplitude).empty();
-  {
-    const ReducedModel released = std::move(search.model); // before the next one takes memory
-  }
-  search.model = reduce(problem.sliding, problem.modes, search.active,
-                        {search.options.reduced_modes, new_attachment, attachments_of(search), sliding, &search.real,
-                         problem.step.factor});
-  search.energy = energy_matrices(search.model);
+  search.made.reset(); // before the next one takes memory
+  problem.reduced.reset();
+  search.made =
+      std::make_shared<const ReducedModel>(reduce(problem.sliding, problem.modes, search.active,
+                                                  {search.options.reduced_modes, new_attachment, attachments_of(search),
+                                                   sliding, &search.real, problem.step.factor}));
+  problem.reduced = search.made;
   describe_model(search);
   search.fidelity.reduction_seconds += MPI_Wtime() - clock;
 }
 
-/// A motion of the reduced model that is not yet periodic.
-struct FreeMotion
-{
-  ReducedState state;
-  double period = 0; // [s] after which it comes nearest to where it was
-  double energy = 0; // [J]
-};
-
-/// One period of the free motion. Returns how far it misses its start, relative to its fluctuation, and sets the
-/// `correction` [s] of its period that would bring it nearest.
-double run_one_period(ReducedMap& map, FreeMotion& motion, double& correction)
-{
-  const ReducedModel& model = map.model;
-  const PeriodEnd period_end = end_of_period(map, motion.period, motion.state);
-  const ReducedState& f = period_end.rate;
-  ReducedState defect{period_end.end.q - motion.state.q, period_end.end.v - motion.state.v};
-  correction = -(defect.q.dot(model.K_z * f.q) + defect.v.dot(model.M_z * f.v)) / doubled_energy(model, f);
-  defect.q += correction * f.q;
-  defect.v += correction * f.v;
-  motion.state = period_end.end;
-  motion.energy = doubled_energy(model, motion.state) / 2;
-  double decides[] = {std::sqrt(doubled_energy(model, defect) / (2 * motion.energy)), motion.energy, correction};
-  MPI_Bcast(decides, 3, MPI_DOUBLE, 0, map.comm); // ranks that decide apart would wait for each other
-  motion.energy = decides[1];
-  correction = decides[2];
-  return decides[0];
-}
-
-/// Free periods until one comes back to within half a percent, or its energy exceeds `most`.
-void run_until_periodic(ReducedSearch& search, FreeMotion& motion, double most)
+/// Free periods from a motion until one comes back to within half a percent, or its fluctuation exceeds `most`.
+Orbit run_free(ReducedSearch& search, ReducedMap& map, const ReducedState& motion, double period, double most)
 {
   const double clock = MPI_Wtime();
-  Fidelity& fidelity = search.fidelity;
-  ReducedMap map = period_map_of(search, search.steps);
+  const EnergyMatrices energy = energy_matrices(map.model);
+  const Flow flow = flow_of(map, energy);
+  const Owned<Vec> start = vector_of(motion);
+  const Preconditioner none;
   Progress progress(map.comm, "reduced model, free", static_cast<double>(most_free_periods));
-  double missed = 1, correction = 0;
-  const auto limited = [&] { return std::clamp(correction, -0.2 * motion.period, 0.2 * motion.period); };
-  // compared every tenth period: whatever the rounding, it stops at the same
-  const auto periodic = [&] { return missed <= 5e-3 && fidelity.reduced_periods % 10 == 0; };
-  while (!periodic() && fidelity.reduced_periods < most_free_periods)
-  {
-    end_if_asked(map.comm);
-    const double before = doubled_energy(search.model, motion.state) / 2;
-    missed = run_one_period(map, motion, correction);
-    if (motion.energy > runaway * before) motion.energy = HUGE_VAL;
-    ++fidelity.reduced_periods;
-    progress.update(
-        static_cast<double>(fidelity.reduced_periods),
-        format("T %.6g s, energy %.3g J, comes back to %.1e", motion.period + correction, motion.energy, missed));
-    if (motion.energy > most || !std::isfinite(missed)) break;
-    if (std::abs(correction) < 2e-3 * motion.period) continue; // a new period costs new matrices
-    motion.period += limited();
-    correction = 0;
-  }
-  motion.period += limited();
-  fidelity.reduced_seconds += MPI_Wtime() - clock;
+  ConvergenceLog log{progress};
+  const OrbitProblem problem{flow, none, zeros_like(start), period};
+  Orbit free = integrate_free_periods(problem, log, start, period, {most_free_periods, 5e-3, 0, 2e-3, most});
+  search.fidelity.reduced_periods += log.convergence.periods;
+  search.fidelity.reduced_seconds += MPI_Wtime() - clock;
+  return free;
 }
 
 /// The state of the next period in which the motion passes through zero along `reference`, upwards. Cycles of a given
 /// number of steps differ a little by where among them they begin, and shooting keeps that.
-ReducedState state_in_phase(const ReducedSearch& search, const FreeMotion& motion, const ReducedState& reference)
+ReducedState state_in_phase(ReducedMap& map, double period, const ReducedState& motion, const ReducedState& reference)
 {
-  ReducedMap map = period_map_of(search, search.steps);
-  const Eigen::VectorXd image = search.model.K_z * reference.q;
-  ReducedState found = motion.state, last = motion.state;
+  const Eigen::VectorXd image = map.model.K_z * reference.q;
+  ReducedState found = motion, last = motion;
   double before = image.dot(last.q);
   bool passed = false;
-  integrate(map, motion.period, motion.state,
+  integrate(map, period, motion,
             [&](const ReducedState& now)
             {
               const double after = image.dot(now.q), part = before / (before - after);
@@ -184,36 +140,30 @@ ReducedState state_in_phase(const ReducedSearch& search, const FreeMotion& motio
   return found;
 }
 
-/// Makes the preconditioner that of the motion.
-void update_correction(ReducedSearch& search, const FreeMotion& motion)
+/// Shoots from near a cycle. Every rank does so by itself, on periods that are the same on all.
+ReducedCycle shoot_at(ReducedSearch& search, ReducedMap& map, const ReducedState& from, double period)
 {
   const double clock = MPI_Wtime();
-  ReducedMap map = period_map_of(search, search.steps);
-  search.correction = monodromy_correction(map, motion.period, motion.state);
-  search.fidelity.reduced_seconds += MPI_Wtime() - clock;
-}
-
-/// Shoots from `start`. Every rank does so by itself, on periods that are the same on all.
-ReducedCycle shoot(ReducedSearch& search, const ReducedCycle& start, ReducedMap& map)
-{
-  const Flow flow = flow_of(map, search.energy);
+  const EnergyMatrices energy = energy_matrices(map.model);
+  const Flow flow = flow_of(map, energy);
+  if (search.correction.left.size() == 0) search.correction = monodromy_correction(map, period, from);
   const Preconditioner preconditioner = preconditioner_of(search.correction, own_coordinates());
-  Progress progress(map.comm, "reduced", 20);
-  ConvergenceLog log{progress};
-  const Owned<Vec> first = vector_of(start.state);
-  OrbitProblem problem{flow, preconditioner, zeros_like(first), start.period, search.tolerance, 0};
-  const ShootingOptions& shooting = search.options.shooting;
-  Orbit begin = evaluate(problem, log, first, start.period);
-  problem.least_fluctuation = begin.fluctuation * std::sqrt(0.1);
-  StageResult found = shoot_in_full_space(problem, shooting, log, std::move(begin));
-  if (found.ending == StageEnding::converged)
-    found = prefer_fewer_rounds(problem, shooting, log, 2, std::move(found)); // which spares the full model that test
-  const bool at_rest = found.ending == StageEnding::collapsed;
-  ReducedCycle cycle{found.ending == StageEnding::converged, reduced_state(found.orbit.state), found.orbit.period, 0,
-                     at_rest ? std::nan("") : found.orbit.residual};
+  ShootingOptions options = search.options.shooting;
+  options.multipliers = 0;
+  options.free_periods = most_free_periods;
+  const Owned<Vec> start = vector_of(from), rest = zeros_like(displacement(start));
+  ShootingSettings settings{search.tolerance};
+  settings.title = "reduced";
+  const ShootingResult found =
+      shoot(flow, preconditioner, {rest, displacement(start), velocity(start), period}, settings, options);
+  const bool at_rest = found.outcome.kind == OutcomeKind::collapsed_to_equilibrium;
+  ReducedCycle cycle{found.outcome.kind == OutcomeKind::converged, reduced_state(found.orbit.state), found.orbit.period,
+                     0, at_rest ? std::nan("") : found.orbit.residual};
   share_state(cycle.state, map.comm); // ranks of other processors may round otherwise
   MPI_Bcast(&cycle.period, 1, MPI_DOUBLE, 0, map.comm);
-  search.fidelity.reduced_periods += log.convergence.periods;
+  cycle.energy = mean_energy(map, cycle.period, cycle.state);
+  search.fidelity.reduced_periods += found.convergence.periods + 1;
+  search.fidelity.reduced_seconds += MPI_Wtime() - clock;
   return cycle;
 }
 
@@ -245,48 +195,37 @@ Owned<Vec> full_motion(const ReducedSearch& search, const ReducedState& state)
 {
   const Owned<Vec> zero = zeros_like(search.problem.sliding.structure.load);
   Owned<Vec> motion = state_of(zero, zero);
-  add_motion(search.model, 1, state.q, displacement(motion));
-  add_motion(search.model, 1, state.v, velocity(motion));
+  add_motion(search.model(), 1, state.q, displacement(motion));
+  add_motion(search.model(), 1, state.v, velocity(motion));
   return motion;
-}
-
-ReducedCycle find_reduced_cycle(ReducedSearch& search, const ReducedCycle& start, int steps)
-{
-  const double clock = MPI_Wtime();
-  ReducedMap map = period_map_of(search, steps);
-  ReducedCycle cycle = shoot(search, start, map);
-  cycle.energy = mean_energy(map, cycle.period, cycle.state);
-  ++search.fidelity.reduced_periods;
-  search.fidelity.reduced_seconds += MPI_Wtime() - clock;
-  return cycle;
 }
 
 void estimate_reduced_step_errors(ReducedSearch& search, const ReducedCycle& cycle)
 {
   Fidelity& fidelity = search.fidelity;
-  const ReducedCycle twice = find_reduced_cycle(search, cycle, 2 * search.steps);
+  const int steps = search.problem.settings.steps_per_period;
+  ReducedMap finer = period_map_of(search, 2 * steps);
+  const ReducedCycle twice = shoot_at(search, finer, cycle.state, cycle.period);
   const RelativeChange errors =
-      step_errors_of({{2 * search.steps, twice.period, twice.energy}, {search.steps, cycle.period, cycle.energy}});
+      step_errors_of({{2 * steps, twice.period, twice.energy}, {steps, cycle.period, cycle.energy}});
   fidelity.step_frequency_error = twice.converged ? errors.frequency : std::nan("");
   fidelity.step_energy_error = twice.converged ? errors.energy : std::nan("");
 }
 
 std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
 {
-  const CycleProblem& problem = search.problem;
+  CycleProblem& problem = search.problem;
   const ComplexMode& mode = problem.unstable.modes.front();
-  const std::optional<State> start = cycle_start(problem);
-  if (!start) return "there is no amplitude to start from";
+  if (!problem.start) return "there is no amplitude to start from";
   constexpr double expected = 2.5; // times the start: to grow beyond it costs a second model and its periods
-  const double first = equivalent_amplitude(problem, *start);
-  double amplitude = expected * first;
-  const Owned<Vec> estimated = fluctuation_of(problem, *start);
+  const State& start = problem.start->state;
+  const double first = equivalent_amplitude(problem, start);
+  const Owned<Vec> estimated = fluctuation_of(problem, start);
   Owned<Vec> motion = copy_of(estimated.get());
   search.real = real_modes_beyond(problem, highest_joining(search));
-  FreeMotion free{{}, 1 / mode.frequency_hz(), 0};
-  double unit = 0; // [J] energy at amplitude 1
+  double amplitude = expected * first, period = 1 / mode.frequency_hz(), unit = 0; // unit: fluctuation at amplitude 1
   const auto on_model = [&](Vec x)
-  { return coordinates(search.model, problem.sliding.structure, displacement(x), velocity(x)); };
+  { return coordinates(search.model(), problem.sliding.structure, displacement(x), velocity(x)); };
   for (;;)
   {
     const std::vector<int> change = pairs_that_may_change(problem.sliding.interface, problem.sliding.equilibrium, mode,
@@ -296,19 +235,26 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
     std::ranges::set_union(change, slip, std::back_inserter(search.active));
     if (const std::string refusal = size_refusal(search); !refusal.empty()) return refusal;
     build_model(search, margin * amplitude);
-    free.state = on_model(motion);
-    if (unit == 0) unit = doubled_energy(search.model, free.state) / 2 / (first * first);
-    run_until_periodic(search, free, 1.5 * unit * amplitude * amplitude);
-    if (!std::isfinite(free.energy)) return "the motion of the reduced model grew beyond all bounds";
-    const double reached = std::sqrt(free.energy / unit);
-    if (reached <= 1.2 * amplitude || search.fidelity.reduced_periods >= most_free_periods) break;
-    motion = full_motion(search, free.state);
-    amplitude = 1.5 * reached; // it was still growing
+    ReducedMap map = period_map_of(search, problem.settings.steps_per_period);
+    const ReducedState from = on_model(motion);
+    if (unit == 0) unit = std::sqrt(doubled_energy(map.model, from)) / first;
+    Orbit free = run_free(search, map, from, period, 1.2 * unit * amplitude);
+    ReducedState end = reduced_state(free.state);
+    share_state(end, map.comm);
+    double decides[] = {free.fluctuation / unit, free.period};
+    MPI_Bcast(decides, 2, MPI_DOUBLE, 0, map.comm); // ranks that decide apart would wait for each other
+    const double reached = decides[0];
+    period = decides[1];
+    if (!(reached <= runaway * amplitude)) return "the motion of the reduced model grew beyond all bounds";
+    if (reached > 1.2 * amplitude && search.fidelity.reduced_periods < most_free_periods)
+    {
+      motion = full_motion(search, end);
+      amplitude = 1.5 * reached; // it was still growing
+      continue;
+    }
+    cycle = shoot_at(search, map, state_in_phase(map, period, end, on_model(estimated)), period);
+    break;
   }
-  free.state = state_in_phase(search, free, on_model(estimated));
-  ++search.fidelity.reduced_periods;
-  update_correction(search, free);
-  cycle = find_reduced_cycle(search, {false, free.state, free.period, 0}, search.steps);
   if (cycle.converged) return {};
   if (std::isnan(cycle.residual)) return "no cycle of the reduced model was found: its shooting fell to rest";
   return format("no cycle of the reduced model was found: its shooting ended at a residual of %.1e, %.0e asked for",

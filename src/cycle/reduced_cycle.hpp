@@ -6,19 +6,19 @@
 namespace squeal
 {
 
-/// The search for a cycle by way of the reduced model, as far as it has come.
+/// The search for the cycle of the reduced model, as far as it has come.
 struct ReducedSearch
 {
-  const CycleProblem& problem;
+  CycleProblem& problem; // gains the model, which recorded contact may change for another one
   const CycleOptions& options;
-  Fidelity fidelity;    // gains periods, errors and the account of the model
-  int steps = 0;        // a period
+  Fidelity& fidelity;   // gains periods, errors and the account of the model
   double tolerance = 0; // on the residual of the reduced model's cycles
   RealModes real{};     // of the basis
   std::vector<int> active{};
-  ReducedModel model{};
-  EnergyMatrices energy{};
-  MonodromyCorrection correction{}; // preconditions the reduced model's shooting and the full one's
+  std::shared_ptr<const ReducedModel> made{};
+  MonodromyCorrection correction{}; // where the first shooting began; it preconditions all
+
+  const ReducedModel& model() const { return *made; }
 };
 
 struct ReducedCycle
@@ -30,13 +30,10 @@ struct ReducedCycle
   double residual = 0; // NaN: of a motion that fell to rest
 };
 
-/// The reduced model's first cycle, from the estimate, with as many active pairs as its motion needs. It runs free
-/// until it is periodic. Where it outgrows the amplitude that its pairs were chosen for they are chosen anew. Returns
-/// why there is none, or nothing.
+/// The reduced model's first cycle, from the problem's start, with as many active pairs as its motion needs. It runs
+/// free until it is periodic. Where it outgrows the amplitude that its pairs were chosen for they are chosen anew.
+/// Returns why there is none, or nothing.
 std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle);
-
-/// The cycle of the reduced model near `start`, with another number of steps a period. The same on every rank.
-ReducedCycle find_reduced_cycle(ReducedSearch& search, const ReducedCycle& start, int steps);
 
 /// The reduced model's cycle at twice as many steps gives the step's errors. Further ones are unknown, NaN.
 void estimate_reduced_step_errors(ReducedSearch& search, const ReducedCycle& cycle);

@@ -1,14 +1,11 @@
 #include "step_refinement.hpp"
 
-#include "squeal/cycle/floquet.hpp"
-
 #include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/cycle/limit_cycle.hpp"
+#include "squeal/cycle/floquet.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <utility>
 
 namespace squeal
@@ -59,177 +56,51 @@ StepError step_error(const std::vector<CycleAtSteps>& cycles, double CycleAtStep
   return {std::abs(last - second * sum), std::abs(second)};
 }
 
-/// The problem without a tolerance: the accuracy ends the iteration.
-OrbitProblem orbit_problem(const CycleCorrection& correction, const Flow& flow, double period)
+CycleAtSteps at_steps(const LimitCycle& cycle)
 {
-  const Vec u0 = correction.problem.sliding.equilibrium.u;
-  return problem_of(flow, correction.preconditioner, {u0, nullptr, nullptr, period}, 0);
+  return {cycle.steps_per_period, cycle.orbit.period, cycle.measured.mean_fluctuating_energy};
 }
 
-/// The full model's iteration, from one number of steps a period to the next. Every period is measured, on contact as
-/// exact as the accuracy needs.
-class FineShooting
+/// Cycles near one another at several numbers of steps a period.
+struct FineShooting
 {
-public:
-  FineShooting(const CycleCorrection& correction, double accuracy, const LimitCycle& coarse)
-      : correction_(correction),
-        options_(correction.options.shooting), map_{correction.problem.sliding, correction.problem.step,
-                                                    coarse.steps_per_period, coarse.theta},
-        orbit_(copy_of(coarse.orbit)),
-        before_(copy_of(coarse.orbit)), flow_{[this](double period, Vec from, Vec end, Vec rate)
-                                              { measure(period, from, end, rate); },
-                                              map_.sliding.structure.M, map_.sliding.structure.K},
-        problem_(orbit_problem(correction, flow_, coarse.orbit.period)),
-        progress_(comm_of(map_.sliding.structure.load), "cycle, finer steps", 20), log_{progress_, coarse.convergence}
-  {
-    map_.reactions = map_.sliding.equilibrium.reactions;
-    map_.options.contact.tolerance = std::min(map_.options.contact.tolerance, 1e-3 * accuracy);
-    options_.max_periods = log_.convergence.periods + most_corrections;
-    multisecant_.target_error = accuracy / 2;
-    multisecant_.exact = whole_tangent_is_cheap(2. * dofs_of(coarse.orbit.state));
-    add_tangent(map_, flow_);
-    keep_cycles_of(flow_, map_.sliding.structure);
-  }
-  FineShooting(const FineShooting&) = delete;
-  FineShooting& operator=(const FineShooting&) = delete;
+  CycleProblem& problem;
+  CycleOptions options; // without a verdict, which the last cycle alone is given
+  double accuracy = 0;
 
-  CycleAtSteps cycle() const { return {map_.steps, orbit_.period, measured_.mean_fluctuating_energy}; }
-  const Convergence& convergence() const { return log_.convergence; }
-  const Multisecant& multisecant() const { return multisecant_; }
-
-  /// Shoots from the extrapolation of the last two cycles to `steps` steps a period: one or two periods do. `beyond`:
-  /// how far past the last cycle, on the line from the one before it. Where none is found, the last one stands.
-  StageEnding shoot_extrapolated(double beyond, int steps)
+  /// Shoots until what further steps would change is below half of the accuracy.
+  LimitCycle cycle_near(const Owned<Vec>& state, double period, int steps, const Convergence& before)
   {
-    Orbit now = std::exchange(orbit_, {});
-    MeasuredPeriod measured = std::move(measured_);
-    const int before = std::exchange(map_.steps, steps);
-    check(VecAXPBY(before_.state, 1 + beyond, -beyond, now.state));
-    const double period = now.period + beyond * (now.period - before_.period);
-    const Owned<Vec> start = std::exchange(before_, std::move(now)).state;
-    const StageEnding ending = shoot_from(start, period);
-    if (ending == StageEnding::converged) return ending;
-    orbit_ = std::move(before_);
-    measured_ = std::move(measured);
-    map_.steps = before;
-    return ending;
+    const int own = std::exchange(problem.settings.steps_per_period, steps);
+    ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), period};
+    start.is_cycle = true;
+    const Finally restore([&] { problem.settings.steps_per_period = own; });
+    const int free_periods = has_undriven_pairs(problem.sliding.interface) ? 1 : 0; // until none slips one way
+    return find_cycle_from(problem, options, start,
+                           {0, free_periods, accuracy / 2, false, "cycle, finer steps", before});
   }
 
-  /// The last cycle on a grid of time that begins half a step later; nothing where none is found.
-  std::optional<CycleAtSteps> cycle_on_moved_grid()
+  /// The changes of a cycle on a grid of time that begins half a step later; none where no cycle is found there. Adds
+  /// its periods.
+  RelativeChange changes_on_moved_grid(LimitCycle& cycle)
   {
-    Orbit own = std::exchange(orbit_, {});
-    MeasuredPeriod measured = std::move(measured_);
-    State later{copy_of(displacement(own.state)), copy_of(velocity(own.state)), 0, measured.start.reactions};
-    set_period(map_, own.period);
-    move_by_part(map_, 0.5, later);
-    const StageEnding ending = shoot_from(state_of(later.u, later.v), own.period);
-    const CycleAtSteps moved = cycle();
-    orbit_ = std::move(own);
-    measured_ = std::move(measured);
-    return ending == StageEnding::converged ? std::optional(moved) : std::nullopt;
+    PeriodMap map{problem.sliding, problem.step, cycle.steps_per_period, cycle.theta};
+    State later{copy_of(displacement(cycle.orbit.state)), copy_of(velocity(cycle.orbit.state)), 0,
+                cycle.measured.start.reactions};
+    set_period(map, cycle.orbit.period);
+    move_by_part(map, 0.5, later);
+    LimitCycle moved =
+        cycle_near(state_of(later.u, later.v), cycle.orbit.period, cycle.steps_per_period, cycle.convergence);
+    cycle.convergence = std::move(moved.convergence);
+    if (moved.outcome.kind != OutcomeKind::converged) return {};
+    return {std::abs(moved.orbit.period / cycle.orbit.period - 1),
+            std::abs(moved.measured.mean_fluctuating_energy / cycle.measured.mean_fluctuating_energy - 1)};
   }
-
-  /// The coarse cycle with the finest one in its place.
-  LimitCycle result(LimitCycle cycle)
-  {
-    cycle.tolerance = 0;
-    cycle.outcome.residual = orbit_.residual;
-    cycle.steps_per_period = map_.steps;
-    cycle.orbit = std::move(orbit_);
-    cycle.measured = std::move(measured_);
-    cycle.costs = {map_.step.factor_seconds, map_.step.condensed_seconds};
-    return cycle;
-  }
-
-private:
-  void measure(double period, Vec from, Vec end, Vec rate)
-  {
-    measured_ = measure_period(map_, {correction_.problem.probes, correction_.options.samples}, period, from, rate);
-    check(VecCopy(measured_.end.u, displacement(end)));
-    check(VecCopy(measured_.end.v, velocity(end)));
-  }
-
-  /// Shoots until what further steps would change is below half of the accuracy, as two steps say: one alone may change
-  /// the energy by nothing by chance.
-  StageEnding shoot_from(const Owned<Vec>& start, double period)
-  {
-    const Orbit first = evaluate(problem_, log_, start, period);
-    record_full(log_, ShootingStage::full_period, first);
-    multisecant_.last_step = {HUGE_VAL, HUGE_VAL};
-    StageResult found = shoot_by_multisecant(problem_, options_, log_, multisecant_, first);
-    orbit_ = std::move(found.orbit);
-    return found.ending;
-  }
-
-  const CycleCorrection& correction_;
-  ShootingOptions options_;
-  PeriodMap map_;
-  Orbit orbit_, before_; // the last one; that of the steps before
-  MeasuredPeriod measured_{};
-  Flow flow_;
-  OrbitProblem problem_;
-  Progress progress_;
-  ConvergenceLog log_;
-  Multisecant multisecant_{};
 };
-
-/// Errors of the step, and why the accuracy was not reached; empty: it was.
-struct Refinement
-{
-  RelativeChange step_errors{};
-  std::string reason{};
-  bool finer = false;  // a cycle was found at more steps
-  bool leaves = false; // twice as many steps led away from the coarse cycle
-};
-
-/// From the cycle at few steps a period to twice as many and on. Where the cycles agree, so must the last one on a
-/// moved grid: those of several numbers of steps may agree by chance.
-Refinement refine(FineShooting& shooting, double accuracy, const CycleAtSteps& coarse)
-{
-  constexpr int most_tries = 6;
-  std::vector<CycleAtSteps> cycles{coarse};
-  Refinement result;
-  double beyond = 0;
-  for (int tries = 1, steps = 2 * coarse.steps;; ++tries)
-  {
-    if (const StageEnding ending = shooting.shoot_extrapolated(beyond, steps); ending != StageEnding::converged)
-    {
-      result.leaves = !result.finer && (ending != StageEnding::stalled || shooting.multisecant().exact);
-      result.reason = format("the accuracy was not reached in %ld periods of the full model at more steps a period",
-                             shooting.convergence().periods);
-      return result;
-    }
-    result.finer = true;
-    cycles.push_back(shooting.cycle());
-    const int before = cycles[cycles.size() - 2].steps, now = cycles.back().steps;
-    result.step_errors = step_errors_of(cycles);
-    RelativeChange of_grid; // of the place of contact's events in their steps
-    if (largest(result.step_errors) <= accuracy / 2)
-      if (const auto moved = shooting.cycle_on_moved_grid())
-        of_grid = {std::abs(moved->period / cycles.back().period - 1),
-                   std::abs(moved->energy / cycles.back().energy - 1)};
-    result.step_errors = {std::max(result.step_errors.frequency, of_grid.frequency),
-                          std::max(result.step_errors.energy, of_grid.energy)};
-    if (largest(result.step_errors) <= accuracy / 2) return result;
-    if (tries == most_tries)
-    {
-      result.reason = format("the accuracy needs more than %d steps a period", now);
-      return result;
-    }
-    const StepError of_period = step_error(cycles, &CycleAtSteps::period, 2),
-                    of_energy = step_error(cycles, &CycleAtSteps::energy, 2);
-    const double needed = std::max({of_period.steps_for(accuracy / 3), of_energy.steps_for(accuracy / 3),
-                                    now * largest(of_grid) / (accuracy / 3)}); // events have errors of first order
-    steps = 4 * static_cast<int>(std::ceil(std::clamp(needed, 1.5 * now, 4. * now) / 4));
-    const double order = of_energy.order(now);
-    beyond = error_fraction(before, now, now, order) - error_fraction(before, now, steps, order);
-  }
-}
 
 /// The coarse cycle as one that was not found, since only its own steps know it. The motion goes on at twice as many
 /// steps from beside it: on a cycle that repels it would stay for hundreds of periods.
-LimitCycle left(LimitCycle cycle, Vec equilibrium)
+void leave(LimitCycle& cycle, Vec equilibrium)
 {
   constexpr double smaller = 0.9; // than the cycle, about the equilibrium: contact opens no further
   cycle.outcome.kind = OutcomeKind::not_periodic;
@@ -239,7 +110,77 @@ LimitCycle left(LimitCycle cycle, Vec equilibrium)
   check(VecAXPY(displacement(cycle.free.state), 1 - smaller, equilibrium));
   cycle.steps_per_period *= 2;
   cycle.multipliers = {};
-  return cycle;
+}
+
+/// Puts the finer cycle in the place of the one found, with its errors. What the search and the verdict left stays.
+void take(LimitCycle finer, const RelativeChange& step_errors, FittedCycle& found)
+{
+  finer.free = std::move(found.cycle.free);
+  finer.multipliers = std::move(found.cycle.multipliers);
+  found.fidelity.step_frequency_error = step_errors.frequency;
+  found.fidelity.step_energy_error = step_errors.energy;
+  found.fidelity.frequency_error = finer.remaining.frequency;
+  found.fidelity.energy_error = finer.remaining.energy;
+  found.cycle = std::move(finer);
+}
+
+/// From the cycle at few steps a period to twice as many and on. Where the cycles agree, so must the last one on a
+/// moved grid: those of several numbers of steps may agree by chance. The state of the next one is extrapolated from
+/// the last two.
+void refine(FineShooting& shooting, FittedCycle& found)
+{
+  constexpr int most_tries = 6;
+  const double accuracy = shooting.accuracy;
+  const bool exact = whole_tangent_is_cheap(2. * dofs_of(found.cycle.orbit.state)); // steps
+  LimitCycle& cycle = found.cycle;
+  std::vector<CycleAtSteps> cycles{at_steps(cycle)};
+  Orbit before = copy_of(cycle.orbit);
+  double beyond = 0; // how far past the last cycle, on the line from the one before it
+  for (int tries = 1, steps = 2 * cycle.steps_per_period;; ++tries)
+  {
+    const Owned<Vec> start = std::move(before.state);
+    check(VecAXPBY(start, 1 + beyond, -beyond, cycle.orbit.state));
+    const double period = cycle.orbit.period + beyond * (cycle.orbit.period - before.period);
+    before = copy_of(cycle.orbit);
+    LimitCycle finer = shooting.cycle_near(start, period, steps, cycle.convergence);
+    if (finer.outcome.kind != OutcomeKind::converged)
+    {
+      cycle.convergence = std::move(finer.convergence);
+      found.fidelity.reason = format("the accuracy was not reached in %ld periods of the full model at more steps a "
+                                     "period",
+                                     cycle.convergence.periods);
+      if (tries == 1 && (finer.ending != StageEnding::stalled || exact))
+        leave(cycle, shooting.problem.sliding.equilibrium.u);
+      return;
+    }
+    cycles.push_back(at_steps(finer));
+    const int last = cycles[cycles.size() - 2].steps;
+    RelativeChange errors = step_errors_of(cycles), of_grid; // of the place of contact's events in their steps
+    if (largest(errors) <= accuracy / 2) of_grid = shooting.changes_on_moved_grid(finer);
+    errors = {std::max(errors.frequency, of_grid.frequency), std::max(errors.energy, of_grid.energy)};
+    take(std::move(finer), errors, found);
+    if (largest(errors) <= accuracy / 2) return;
+    if (tries == most_tries)
+    {
+      found.fidelity.reason = format("the accuracy needs more than %d steps a period", steps);
+      return;
+    }
+    const StepError of_period = step_error(cycles, &CycleAtSteps::period, 2),
+                    of_energy = step_error(cycles, &CycleAtSteps::energy, 2);
+    const double needed = std::max({of_period.steps_for(accuracy / 3), of_energy.steps_for(accuracy / 3),
+                                    steps * largest(of_grid) / (accuracy / 3)}); // events have errors of first order
+    const int now =
+        std::exchange(steps, 4 * static_cast<int>(std::ceil(std::clamp(needed, 1.5 * steps, 4. * steps) / 4)));
+    const double order = of_energy.order(now);
+    beyond = error_fraction(last, now, now, order) - error_fraction(last, now, steps, order);
+  }
+}
+
+/// Notes that the end of the run cut the refinement short.
+void cut_short(FittedCycle& found)
+{
+  found.cycle.cut_short = true;
+  found.fidelity.reason = format("the run was ended at %d steps a period", found.cycle.steps_per_period);
 }
 
 } // namespace
@@ -251,58 +192,33 @@ RelativeChange step_errors_of(const std::vector<CycleAtSteps>& cycles)
           step_error(cycles, &CycleAtSteps::energy, 1).at(steps)};
 }
 
-FittedCycle refine_steps(const CycleCorrection& correction, FittedCycle found)
+void refine_steps(CycleProblem& problem, const CycleOptions& options, FittedCycle& found)
 {
   LimitCycle& cycle = found.cycle;
-  Fidelity& fidelity = found.fidelity;
-  if (cycle.outcome.kind != OutcomeKind::converged) return found;
-  const CycleProblem& problem = correction.problem;
+  const int coarse = cycle.steps_per_period;
   try
   {
-    FineShooting shooting(correction, fidelity.accuracy, cycle);
-    const Refinement refinement =
-        refine(shooting, fidelity.accuracy,
-               {cycle.steps_per_period, cycle.orbit.period, cycle.measured.mean_fluctuating_energy});
-    cycle.convergence = shooting.convergence();
-    fidelity.full_periods = cycle.convergence.periods;
-    if (!refinement.reason.empty()) fidelity.reason = refinement.reason;
-    if (refinement.leaves) cycle = left(std::move(cycle), problem.sliding.equilibrium.u);
-    if (!refinement.finer) return found;
-    fidelity.step_frequency_error = refinement.step_errors.frequency;
-    fidelity.step_energy_error = refinement.step_errors.energy;
-    fidelity.frequency_error = shooting.multisecant().remaining.frequency;
-    fidelity.energy_error = shooting.multisecant().remaining.energy;
-    cycle = shooting.result(std::move(cycle));
+    FineShooting shooting{problem, options, found.fidelity.accuracy};
+    shooting.options.shooting.multipliers = 0;
+    shooting.options.shooting.max_periods = cycle.convergence.periods + most_corrections;
+    refine(shooting, found);
   }
   catch (const Interrupted&) // on all ranks alike: the cycle that was found stays
   {
-    cycle.cut_short = true;
-    fidelity.reason = format("the run was ended at %d steps a period", cycle.steps_per_period);
+    cut_short(found);
   }
+  found.fidelity.full_periods = cycle.convergence.periods;
   // impacts may make a cycle repel that attracts at few steps; where that costs too much, the bars at few hold it
   const Structure& structure = problem.sliding.structure;
   const int judged = steps_of_verdict(structure, cycle.steps_per_period);
-  if (cycle.cut_short || is_dear(judged * work_of_step(structure))) return found;
-  Verdict verdict = examine(problem, correction.options, cycle);
-  if (verdict.cut_short)
-  {
-    cycle.cut_short = true;
-    fidelity.reason = format("the run was ended at %d steps a period", cycle.steps_per_period);
-    return found;
-  }
+  if (cycle.cut_short || cycle.outcome.kind != OutcomeKind::converged || cycle.steps_per_period == coarse ||
+      is_dear(judged * work_of_step(structure)))
+    return;
+  Verdict verdict = examine(problem, options, cycle);
+  if (verdict.cut_short) return cut_short(found);
   refuse_repelling(verdict, problem.unstable.modes.size() - 1, cycle.outcome);
   cycle.multipliers = std::move(verdict.floquet.multipliers);
-  fidelity.verdict_steps = judged;
-  return found;
-}
-
-RelativeChange model_errors_of(const CycleCorrection& correction, const Orbit& orbit)
-{
-  const Flow flow{{}, correction.problem.sliding.structure.M, correction.problem.sliding.structure.K};
-  Multisecant multisecant;
-  estimate_remaining_change(orbit_problem(correction, flow, orbit.period), correction.options.shooting, multisecant,
-                            orbit);
-  return multisecant.remaining;
+  found.fidelity.verdict_steps = judged;
 }
 
 } // namespace squeal

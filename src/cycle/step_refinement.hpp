@@ -2,26 +2,14 @@
 /// Cycles of the full model near one that is known, at as many steps a period as the accuracy needs (src/README.md,
 /// section 7.8).
 #include "squeal/cycle/fidelity.hpp"
-#include "squeal/shooting/secants.hpp"
 
 namespace squeal
 {
 
-/// What corrections of a cycle need. The preconditioner decides how soon they end, not where.
-struct CycleCorrection
-{
-  const CycleProblem& problem;
-  const CycleOptions& options;
-  const Preconditioner& preconditioner;
-};
-
 /// Takes a converged cycle to twice as many steps a period; where these are still too few, to as many as the errors of
 /// both foretell. Where the accuracy is not reached, the finest cycle stands with its errors, and its reason says so.
 /// Where the run is asked to end meanwhile, the cycle that was found stays.
-FittedCycle refine_steps(const CycleCorrection& correction, FittedCycle found);
-
-/// The errors of a converged cycle whose steps are given: what one further step of the iteration would change.
-RelativeChange model_errors_of(const CycleCorrection& correction, const Orbit& orbit);
+void refine_steps(CycleProblem& problem, const CycleOptions& options, FittedCycle& found);
 
 /// A cycle at some number of steps a period.
 struct CycleAtSteps

@@ -1,9 +1,9 @@
 #include "squeal/shooting/secants.hpp"
-#include "beside_orbit.hpp"
 #include "squeal/base/cost.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace squeal
 {
@@ -217,6 +217,19 @@ BorderedVector step_by_columns(const BorderedSystem& system, const Orbit& orbit,
 namespace
 {
 
+/// The iteration's memory.
+struct Multisecant
+{
+  bool exact = false;                           // steps are Newton's, whose secants are columns of the exact tangent
+  std::deque<Secant> secants{};                 // newest first
+  RelativeChange last_step{HUGE_VAL, HUGE_VAL}; // one step alone may change the energy by nothing by chance
+};
+
+Multisecant begin(const OrbitProblem& problem, const Orbit& start)
+{
+  return {problem.flow.apply_tangent && whole_tangent_is_cheap(2. * dofs_of(start.state))};
+}
+
 /// The clamped step (dx, dT) from the orbit; `defect`: its defect, preconditioned.
 BorderedVector step_from(const OrbitProblem& problem, const ShootingOptions& options, Multisecant& multisecant,
                          const Orbit& orbit, Vec defect)
@@ -237,24 +250,22 @@ BorderedVector step_from(const OrbitProblem& problem, const ShootingOptions& opt
   return step;
 }
 
-/// Estimates what this step and all further ones change.
-void note_step(const OrbitProblem& problem, Multisecant& multisecant, const Orbit& orbit, const BorderedVector& step)
+/// What this step changes.
+RelativeChange change_by(const OrbitProblem& problem, const Orbit& orbit, const BorderedVector& step)
 {
   const Owned<Vec> fluctuation = fluctuation_of(problem, orbit);
   const double work = energy_product(problem.flow, fluctuation, step.state);
-  const RelativeChange now{std::abs(step.period) / orbit.period,
-                           2 * std::abs(work) / (orbit.fluctuation * orbit.fluctuation)};
-  multisecant.remaining = {std::max(2 * now.frequency, multisecant.last_step.frequency / 2),
-                           std::max(2 * now.energy, multisecant.last_step.energy / 2)};
-  multisecant.last_step = now;
+  return {std::abs(step.period) / orbit.period, 2 * std::abs(work) / (orbit.fluctuation * orbit.fluctuation)};
 }
 
-/// Whether what is left to change is below the target error, if there is one.
-bool meets_target(const OrbitProblem& problem, Multisecant& multisecant, const Orbit& orbit, const BorderedVector& step)
+/// Whether what is left to change is below the target error, if there is one. Sets what is left.
+bool meets_target(const OrbitProblem& problem, Multisecant& multisecant, const Orbit& orbit, const BorderedVector& step,
+                  RelativeChange& remaining)
 {
-  if (!(multisecant.target_error > 0)) return false;
-  note_step(problem, multisecant, orbit, step);
-  return std::max(multisecant.remaining.frequency, multisecant.remaining.energy) <= multisecant.target_error;
+  if (!(problem.target_error > 0)) return false;
+  const RelativeChange now = change_by(problem, orbit, step), before = std::exchange(multisecant.last_step, now);
+  remaining = {std::max(2 * now.frequency, before.frequency / 2), std::max(2 * now.energy, before.energy / 2)};
+  return std::max(remaining.frequency, remaining.energy) <= problem.target_error;
 }
 
 /// Keeps a step with what it did to the preconditioned defect: `defect` becomes that of `next`.
@@ -270,18 +281,21 @@ void keep_secant(const OrbitProblem& problem, const ShootingOptions& options, Mu
 
 } // namespace
 
-void estimate_remaining_change(const OrbitProblem& problem, const ShootingOptions& options, Multisecant& multisecant,
-                               const Orbit& orbit)
+RelativeChange remaining_change(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit)
 {
+  Multisecant multisecant = begin(problem, orbit);
   const Owned<Vec> defect = preconditioned(problem, orbit.period, orbit.defect);
-  note_step(problem, multisecant, orbit, step_from(problem, options, multisecant, orbit, defect));
+  const RelativeChange next = change_by(problem, orbit, step_from(problem, options, multisecant, orbit, defect));
+  return {2 * next.frequency, 2 * next.energy};
 }
 
-StageResult shoot_by_multisecant(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
-                                 Multisecant& multisecant, const Orbit& start)
+StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, Orbit start)
 {
+  if (start.residual <= problem.tolerance) return {std::move(start), StageEnding::converged};
+  if (options.finish == Finish::none) return {std::move(start), StageEnding::stalled};
+  Multisecant multisecant = begin(problem, start);
   StageResult best{copy_of(start), StageEnding::stalled};
-  Orbit orbit = copy_of(start);
+  Orbit orbit = std::move(start);
   Owned<Vec> defect = preconditioned(problem, orbit.period, orbit.defect);
   // near a solution each exact step is far better than the last
   const PetscInt patience = multisecant.exact ? 8 : options.stall;
@@ -289,7 +303,8 @@ StageResult shoot_by_multisecant(const OrbitProblem& problem, const ShootingOpti
   while (best.orbit.residual > problem.tolerance)
   {
     BorderedVector step = step_from(problem, options, multisecant, orbit, defect);
-    if (meets_target(problem, multisecant, orbit, step)) return {std::move(orbit), StageEnding::converged};
+    if (meets_target(problem, multisecant, orbit, step, best.remaining))
+      return {std::move(orbit), StageEnding::converged, best.remaining};
     if (log.convergence.periods >= options.max_periods || since_best >= patience) return best;
     // whole steps may go to and fro across a kink of the flow, where an event of contact passes from one step to
     // another
@@ -327,26 +342,6 @@ StageResult shoot_by_multisecant(const OrbitProblem& problem, const ShootingOpti
   return best;
 }
 
-StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, Orbit start)
-{
-  if (start.residual <= problem.tolerance) return {std::move(start), StageEnding::converged};
-  if (options.finish == Finish::none) return {std::move(start), StageEnding::stalled};
-  Multisecant memory;
-  memory.exact = problem.flow.apply_tangent && whole_tangent_is_cheap(2. * dofs_of(problem.equilibrium));
-  return shoot_by_multisecant(problem, options, log, memory, start);
-}
-
-StageResult shoot_in_full_space(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
-                                Orbit start)
-{
-  StageResult result = shoot_once(problem, options, log, std::move(start));
-  const bool given_up = result.ending != StageEnding::converged && log.convergence.periods < options.max_periods;
-  if (!given_up || options.finish == Finish::none) return result;
-  Orbit again = integrate_free_periods(problem, log, result.orbit.state, result.orbit.period, {10, 0});
-  if (collapsing(problem, again)) return {std::move(again), StageEnding::collapsed};
-  return shoot_once(problem, options, log, std::move(again));
-}
-
 StageResult prefer_fewer_rounds(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
                                 int rounds, StageResult found)
 {
@@ -358,7 +353,7 @@ StageResult prefer_fewer_rounds(const OrbitProblem& problem, const ShootingOptio
                               period,       problem.tolerance,      problem.least_fluctuation};
       Orbit part = evaluate(once, log, found.orbit.state, period);
       if (!(part.residual < 2e-2)) continue; // the shorter period has finer steps, which move the orbit
-      StageResult shorter = shoot_in_full_space(once, options, log, std::move(part));
+      StageResult shorter = shoot_once(once, options, log, std::move(part));
       if (shorter.ending == StageEnding::converged) found = std::move(shorter);
     }
   return found;

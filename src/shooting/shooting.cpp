@@ -214,9 +214,10 @@ OrbitProblem problem_of(const Flow& flow, const Preconditioner& preconditioner, 
 ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, const ShootingStart& start,
                      const ShootingSettings& settings, const ShootingOptions& options)
 {
-  Progress progress(comm_of(start.u), "cycle", settings.free_periods + 60.);
-  ConvergenceLog log{progress};
+  Progress progress(comm_of(start.u), settings.title, settings.free_periods + 60.);
+  ConvergenceLog log{progress, settings.before};
   OrbitProblem problem = problem_of(flow, preconditioner, start, settings.tolerance);
+  problem.target_error = settings.target_error;
   const Owned<Vec> first = state_of(start.u, start.v);
   Orbit free =
       integrate_free_periods(problem, log, first, start.period, {settings.free_periods, 0, options.free_periods});
@@ -226,7 +227,8 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   const Search search{problem, options, log, start};
   Attempt found = attempt_from(search, free, nullptr);
   const bool slow = leaves_too_slowly(search, found, done);
-  if (options.finish != Finish::none && !slow) found = search_on(search, std::move(found), done, free);
+  if (options.finish != Finish::none && settings.goes_on && !slow)
+    found = search_on(search, std::move(found), done, free);
   const bool goes_on = !slow && std::isfinite(free.residual);
   StageEnding ending = found.found.ending;
   if (ending == StageEnding::collapsed) ending = StageEnding::stalled; // unless the free motion decays, too
@@ -236,6 +238,10 @@ ShootingResult shoot(const Flow& flow, const Preconditioner& preconditioner, con
   result.outcome = outcome_of(log.convergence, ending, found.found.orbit.residual);
   if (!found.converged() && goes_on && slips_one_way(problem, free)) note_slip(log.slips, result.outcome);
   refuse_repelling(found.verdict, start.other_unstable, result.outcome);
+  result.ending = found.found.ending;
+  if (found.converged())
+    result.remaining =
+        settings.target_error > 0 ? found.found.remaining : remaining_change(problem, options, found.found.orbit);
   result.multipliers = std::move(found.verdict.floquet.multipliers);
   if (slow) result.outcome.reason += leaving_time(result.multipliers, found.found.orbit.period);
   result.orbit = std::move(found.found.orbit);

@@ -22,8 +22,12 @@ inline LimitCycle cycle_of(const SmallModel& model, const CycleSettings& setting
   const Estimate estimate = estimate_amplitude(sliding, linearised, mode);
   const StepOptions step;
   const ModesOptions modes_options;
-  const CycleProblem problem{sliding,       linearised, modes.modes, {{&mode, 1}, {&estimate, 1}}, settings, step,
-                             modes_options, nullptr,    given};
+  const UnstableModes unstable{{&mode, 1}, {&estimate, 1}};
+  std::optional<State> state = given ? copy_of(*given) : state_on_modes(sliding, unstable, settings);
+  std::optional<GivenStart> start;
+  if (state) start = GivenStart{std::move(*state)};
+  CycleProblem problem{
+      sliding, linearised, modes.modes, unstable, settings, step, modes_options, nullptr, start ? &*start : nullptr};
   return find_cycle_from_start(problem, options);
 }
 

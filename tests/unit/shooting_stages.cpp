@@ -120,35 +120,15 @@ TEST_CASE("the multisecant iteration stops at its target error, which the estima
   for (const double target : {1e-2, 1e-4, 1e-6})
   {
     CAPTURE(target);
-    Multisecant multisecant;
-    multisecant.target_error = target;
-    multisecant.last_step = {HUGE_VAL, HUGE_VAL};
-    const StageResult found = shoot_by_multisecant(problem.orbit, options, problem.log, multisecant, start);
+    problem.orbit.target_error = target;
+    const StageResult found = shoot_once(problem.orbit, options, problem.log, copy_of(start));
     REQUIRE(found.ending == StageEnding::converged);
-    CHECK(multisecant.remaining.frequency <= target);
-    CHECK(multisecant.remaining.energy <= target);
+    CHECK(found.remaining.frequency <= target);
+    CHECK(found.remaining.energy <= target);
     CHECK(std::abs(found.orbit.period / vdp_period - 1) <= target);
     CHECK(found.orbit.residual < last);
     last = found.orbit.residual;
   }
-}
-
-TEST_CASE("secants of one solution serve the next one at nearly the same flow")
-{
-  Problem problem(van_der_pol, {1}, 6.3);
-  const ShootingOptions options;
-  const Owned<Vec> state = state_on_first_rank({1.9}, {0.3});
-  const Orbit start = evaluate(problem.orbit, problem.log, state, 6.5);
-  Multisecant multisecant;
-  const StageResult found = shoot_by_multisecant(problem.orbit, options, problem.log, multisecant, start);
-  REQUIRE(found.ending == StageEnding::converged);
-  const int first = problem.log.convergence.iterations;
-  const Owned<Vec> beside = copy_of(found.orbit.state.get());
-  check(VecScale(beside, 1.001));
-  const Orbit again = evaluate(problem.orbit, problem.log, beside, found.orbit.period);
-  const StageResult second = shoot_by_multisecant(problem.orbit, options, problem.log, multisecant, again);
-  CHECK(second.ending == StageEnding::converged);
-  CHECK(problem.log.convergence.iterations - first < first);
 }
 
 TEST_CASE("a start at rest collapses")
@@ -166,7 +146,7 @@ TEST_CASE("the multipliers' product is the exponential of the integrated diverge
   const ShootingOptions options;
   const Owned<Vec> state = state_on_first_rank({1.9, 0.05}, {0, 0});
   const StageResult found =
-      shoot_in_full_space(problem.orbit, options, problem.log, evaluate(problem.orbit, problem.log, state, 6.287));
+      shoot_once(problem.orbit, options, problem.log, evaluate(problem.orbit, problem.log, state, 6.287));
   REQUIRE(found.ending == StageEnding::converged);
   const FloquetAnalysis analysis = find_multipliers(problem.orbit, options, found.orbit);
   const auto& values = analysis.multipliers.values;

@@ -3,7 +3,7 @@
 ///
 /// The reduced model (reduction/reduced_model.hpp) runs free from the estimate until its motion is periodic. Where it
 /// outgrows the amplitude that its active pairs were chosen for, they are chosen again. Then it is shot at. Its cycle
-/// is the start on the full model, its derivative the preconditioner.
+/// is the start on the full model.
 ///
 /// "reduced": a period of the full model gives the reduced cycle's error, a cycle at twice as many steps the step's.
 /// "auto": what the scene gives is kept. Where it leaves the steps open, the full model's cycle is found at few, and
@@ -61,20 +61,12 @@ struct FittedCycle
 {
   LimitCycle cycle;
   Fidelity fidelity;
-  bool answers = true; // false: the full model follows, fidelity.reason says why
+  std::optional<Outcome> on_reduced{}; // of an attempt by way of the reduced model that left it to the full one
 };
 
-/// Why no reduced model leads to the cycle that "auto" seeks; empty if one may. Not collective.
-std::string no_reduced_search(const CycleProblem& problem);
-
-/// Finds the cycle by way of the reduced model's, which was asked for or may do. Collective. A search that fails has
-/// its outcome and reason. Error: a reduced model that was asked for cannot be made.
-FittedCycle find_on_reduced_model(const CycleProblem& problem, const FidelityRequest& request,
-                                  const CycleOptions& options);
-
-/// Finds the cycle of the full model from the problem's start. `tried`: the account of a reduced model that was tried
-/// before. Collective.
-FittedCycle find_on_full_model(const CycleProblem& problem, const FidelityRequest& request, const CycleOptions& options,
-                               const Fidelity& tried);
+/// Finds the cycle: by way of the reduced model's, where that was asked for or may do, else of the full model from the
+/// problem's start. Collective. A search that fails has its outcome and reason. Error: a reduced model that was asked
+/// for cannot be made.
+FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, const CycleOptions& options);
 
 } // namespace squeal

@@ -6,6 +6,9 @@
 
 #include <optional>
 
+#include <memory>
+#include <optional>
+
 namespace squeal
 {
 
@@ -28,30 +31,27 @@ struct StepCosts
   double factor_seconds = 0, condensed_seconds = 0;
 };
 
-/// outcome: as of shooting (shooting/shooting.hpp); "skipped", "refused" or "off" where nothing was integrated.
-struct LimitCycle
+/// The result of shooting, and what is measured on it. outcome: "skipped", "refused" or "off" as well, where nothing
+/// was integrated. orbit: the cycle, or the best candidate met. convergence: its periods include the measured one.
+struct LimitCycle : ShootingResult
 {
-  Outcome outcome;
   int steps_per_period = 0;
   double tolerance = 0; // that the residual met; 0: the accuracy was judged instead
   double theta = 0.5;
-  Orbit orbit;             // the cycle, or the best candidate met
-  Convergence convergence; // its periods include the measured one
-  Multipliers multipliers;
-  MeasuredPeriod measured; // from the orbit's state
-  Orbit free;              // the end of the free motion that the search went on from; null where there was none
-  StepCosts costs;         // of the last theta step made
-  bool cut_short = false;  // the run was asked to end in the search for multipliers, or for finer steps
+  MeasuredPeriod measured{};           // from the orbit's state
+  StepCosts costs{};                   // of the last theta step made
   std::vector<OffsetSpread> spreads{}; // over the offsets that joints hold; where the whole tangent is cheap
 };
 
 struct ReducedModel;
 
-/// An orbit near a cycle, of a search that was ended before.
-struct ResumedOrbit
+/// A state that a search starts from.
+struct GivenStart
 {
   State state;
-  double period = 0; // [s]
+  double period =
+      0;          // [s] of the cycle that it is nearly, which needs no free periods; 0: none, and the mode's is taken
+  int rounds = 1; // as many as the period may be of the cycle
 };
 
 /// The brake about its sliding equilibrium, and what is asked of its cycle.
@@ -65,11 +65,8 @@ struct CycleProblem
   const StepOptions& step;
   const ModesOptions& modes_options; // of real modes beyond the band
   Mat probes = nullptr;
-  const State* given = nullptr;          // where CycleStartKind::transient and ::file start
-  double given_period = 0;               // [s] of the cycle that is given; 0: none is, and the mode's is taken
-  int given_rounds = 1;                  // as many as that period may be of the cycle
-  const ResumedOrbit* resumed = nullptr; // where shooting at the full model goes on, whatever it started from
-  const ReducedModel* reduced = nullptr; // whose cycle it starts from
+  const GivenStart* start = nullptr;             // null: there is no amplitude to start from
+  std::shared_ptr<const ReducedModel> reduced{}; // gains that of recorded contact
 };
 
 /// The problem of another brake, at its equilibrium.
@@ -78,32 +75,26 @@ CycleProblem at_equilibrium(const CycleProblem& problem, const SlidingEquilibriu
 /// The problem with other settings.
 CycleProblem with_settings(CycleProblem problem, const CycleSettings& settings);
 
-/// Those of the unstable modes that are not followed, at their estimated amplitudes, about the equilibrium.
-std::vector<State> other_unstable_motions(const CycleProblem& problem);
-
-/// The state that the scene asks the search to start from. It is the modes at their estimated amplitudes, the followed
-/// one at an amplitude, or the state given. Nothing where there is no amplitude to start from.
-std::optional<State> cycle_start(const CycleProblem& problem);
+/// The state at which the unstable modes are at their estimated amplitudes; with CycleStartKind::mode the followed one
+/// alone at the scene's. Nothing where there is no amplitude.
+std::optional<State> state_on_modes(const SlidingEquilibrium& sliding, const UnstableModes& unstable,
+                                    const CycleSettings& settings);
 
 /// The amplitude of the followed mode whose fluctuating energy is the state's. [m]
 double equivalent_amplitude(const CycleProblem& problem, const State& state);
 
-/// The cycle from the scene's start.
-LimitCycle find_cycle_from_start(const CycleProblem& problem, const CycleOptions& options);
+/// The cycle of the full model from the problem's start.
+LimitCycle find_cycle_from_start(CycleProblem& problem, const CycleOptions& options);
 
-/// The cycle from the resumed orbit.
-LimitCycle find_cycle_from_resumed(const CycleProblem& problem, const CycleOptions& options,
-                                   const Preconditioner* preconditioner);
-
-/// The cycle from any start, after a number of free periods. `preconditioner`: null: that of the last of these.
-LimitCycle find_cycle_from(const CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
-                           const Preconditioner* preconditioner, int free_periods);
+/// The cycle of the full model from any start.
+LimitCycle find_cycle_from(CycleProblem& problem, const CycleOptions& options, const ShootingStart& start,
+                           const ShootingSettings& settings);
 
 // The checkpoint of a search for a cycle: the orbit that it has reached. A restarted search begins there, and finds
 // the same cycle to its tolerance.
 
 /// The orbit of the run that is gone on with; nothing where there is none. Collective.
-std::optional<ResumedOrbit> kept_cycle(const Structure& structure);
+std::optional<GivenStart> kept_cycle(const Structure& structure);
 
 /// Keeps the orbit from this start. Collective.
 void keep_cycle(const Structure& structure, Vec start, double period);

@@ -56,21 +56,15 @@ void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& gri
 /// Notes what undriven pairs did in the period recorded last from this start, and moves the rest to it.
 void note_joints(PeriodMap& map, Vec start);
 
-/// Gives the flow the exact tangent of the map, and the offsets of undriven pairs. Borrows the map.
-void add_tangent(PeriodMap& map, Flow& flow);
-
-/// The map as a flow for shooting. Borrows the map.
+/// The map as a flow for shooting, with its exact tangent and the offsets of undriven pairs. Borrows the map.
 Flow flow_of(PeriodMap& map);
-
-/// Turns `rate`, which holds x_(N-1), into dPhi/dT. `end`, the state x_N, goes a step on.
-void complete_rate(PeriodMap& map, StepWork& work, State& end, Vec rate);
 
 // One period of the brake, recorded, and what is measured on it (src/README.md, section 6.10).
 
 /// What is measured on one period.
 struct MeasuredPeriod
 {
-  State start, end;                                    // with the reactions there
+  State start;                                         // with the reactions there
   double mean_energy = 0, mean_fluctuating_energy = 0; // [J] fluctuating: with u - u0
   double open_pairs_mean = 0;
   int open_pairs_max = 0, stick_pairs_max = 0;
@@ -88,8 +82,7 @@ struct Recording
   PetscInt samples = 0; // of the displacements
 };
 
-/// Integrates a period from the state `start`. `rate`: dPhi/dperiod at its end, or null. Collective. Where the run is
-/// asked to end it throws Interrupted.
-MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double period, Vec start, Vec rate);
+/// Integrates a period from the state `start`. Collective. Where the run is asked to end it throws Interrupted.
+MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double period, Vec start);
 
 } // namespace squeal

@@ -76,14 +76,6 @@ SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle&
 
 // The motion that was found from a point, and how it was sought.
 
-/// A state that a search starts from in place of the modes'.
-struct GivenStart
-{
-  State state;
-  double period = 0; // [s] of the cycle that it is nearly; 0: of none that is known
-  int rounds = 1;    // as many as the period may be of the cycle
-};
-
 /// One attempt to find what vibrates.
 struct Attempt
 {

@@ -32,6 +32,12 @@ struct Orbit
 /// A deep copy.
 Orbit copy_of(const Orbit& orbit);
 
+/// Relative changes of an orbit.
+struct RelativeChange
+{
+  double frequency = 0, energy = 0;
+};
+
 /// What is sought. A stage borrows it and never changes it.
 struct OrbitProblem
 {
@@ -41,6 +47,7 @@ struct OrbitProblem
   double first_period = 0;      // [s] T may differ from it by a factor of two
   double tolerance = 0;         // on the residual
   double least_fluctuation = 0; // an orbit with less is falling onto the equilibrium
+  double target_error = 0;      // above 0: converged as soon as all further steps would change no more
 };
 
 /// The stages of the solver, as the records of convergence name them.
@@ -49,10 +56,9 @@ enum class ShootingStage
   free_periods, // integration without correction
   subspace,     // Newton on the coordinates of a few given shapes
   multisecant,
-  full_period, // one evaluation of a full model's flow
 };
 
-template <> inline constexpr std::array words_of<ShootingStage> = {"free", "reduced", "multisecant", "full period"};
+template <> inline constexpr std::array words_of<ShootingStage> = {"free", "reduced", "multisecant"};
 
 /// One line of the history of convergence.
 struct NewtonRecord
@@ -97,6 +103,7 @@ struct StageResult
 {
   Orbit orbit;
   StageEnding ending = StageEnding::stalled;
+  RelativeChange remaining{}; // where a target error ended it: estimate of what all further steps would change
 };
 
 /// One evaluation of the flow. Error: as of the flow.
@@ -120,5 +127,25 @@ bool slips_one_way(const OrbitProblem& problem, const Orbit& orbit);
 
 /// x - rest
 Owned<Vec> fluctuation_of(const OrbitProblem& problem, const Orbit& orbit);
+
+// Integration without correction (src/README.md, section 6.3): the flow itself brings the motion nearer to an orbit
+// that attracts.
+
+/// The residual without its part along the flow: how far the motion misses its start at the nearest recurrence.
+double return_residual(const OrbitProblem& problem, const Orbit& orbit);
+
+/// When free integration ends.
+struct FreeIntegration
+{
+  int periods = 0;          // at most
+  double near_periodic = 0; // return residual at which it ends before; 0: never
+  int at_most = 0;          // periods where an offset still slips one way
+  double refactored = 0.02; // least correction over the period that is worth a factor at once; shooting's are smaller
+  double outgrown = std::numeric_limits<double>::infinity(); // fluctuation above which it ends before
+};
+
+/// Free periods from the state, then the evaluation of the end with the period of the best recurrence.
+Orbit integrate_free_periods(const OrbitProblem& problem, ConvergenceLog& log, Vec state, double period,
+                             const FreeIntegration& asked);
 
 } // namespace squeal

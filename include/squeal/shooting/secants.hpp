@@ -80,50 +80,23 @@ BorderedVector step_by_secants(const BorderedSystem& system, const std::deque<Se
 BorderedVector step_by_columns(const BorderedSystem& system, const Orbit& orbit, Vec parameter_column,
                                BorderedVector wanted, double accuracy, std::deque<Secant>& secants);
 
-// Full-space solution by secants (src/README.md, section 6.7; Anderson 1965, Eyert 1996) about the preconditioner: one
-// period a step, no difference columns.
+// The full-space finish of a shooting (src/README.md, sections 6.7 and 6.8; Anderson 1965, Eyert 1996): secants about
+// the preconditioner, one period a step, no difference columns. Secants are exact where a whole tangent is cheap. All
+// functions are collective. Error: as of the flow.
 //
 // Caveat: no globalisation. The step is clamped and the iteration guarded, and it ends without progress.
 
-/// Relative changes of an orbit.
-struct RelativeChange
-{
-  double frequency = 0, energy = 0;
-};
+/// Twice what the next step from the orbit would change, since the signs of the steps alternate.
+RelativeChange remaining_change(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit);
 
-/// The iteration's memory; it serves the next solution at nearly the same flow as well.
-struct Multisecant
-{
-  bool exact = false;           // steps are Newton's, whose secants are columns of the exact tangent
-  std::deque<Secant> secants{}; // newest first
-  double target_error = 0;      // above 0: converged as soon as `remaining` is at most this
-  RelativeChange last_step{};   // of the latest step estimated
-  RelativeChange remaining{};   // estimate of what all further steps would change
-};
-
-/// Sets `last_step` to what the next step from the orbit would change. `remaining` is twice that, or half of the step
-/// before if that is more, since the signs of the steps alternate. Collective.
-void estimate_remaining_change(const OrbitProblem& problem, const ShootingOptions& options, Multisecant& multisecant,
-                               const Orbit& orbit);
-
-/// Iterates from `start` until the residual meets the problem's tolerance, or the remaining change the target error.
-/// The ending says whether it did, stalled or collapsed to the equilibrium. Collective. Error: as of the flow.
-StageResult shoot_by_multisecant(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
-                                 Multisecant& multisecant, const Orbit& start);
-
-// The full-space finish of a shooting (src/README.md, section 6.8), by the solvers that -cycle_finish names. Both are
-// collective. Error: as of the flow.
-
-/// One attempt by the multisecant iteration; its secants are exact where a whole tangent is cheap.
+/// Iterates from `start` until the residual meets the problem's tolerance, or the remaining change its target error:
+/// twice the last step's, or half of the step before if that is more. The ending says whether it did, stalled or
+/// collapsed to the equilibrium.
 StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, Orbit start);
 
-/// The same; where it gives up, ten free periods and one more attempt.
-StageResult shoot_in_full_space(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
-                                Orbit start);
-
 /// An orbit gone round several times is a solution, too. Where the period over a prime factor of `rounds` nearly closes
-/// the one found, that solution is returned, else `found`. Collective. Takes for each factor the steps of a period, and
-/// of a search where it nearly closes.
+/// the one found, that solution is returned, else `found`. Takes for each factor the steps of a period, and of a search
+/// where it nearly closes.
 StageResult prefer_fewer_rounds(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log,
                                 int rounds, StageResult found);
 

@@ -44,11 +44,15 @@ struct ShootingStart
   int rounds = 1;                              // of a cycle: as many as the period may be of it
 };
 
-/// What a scene asks of the solver.
+/// What is asked of the solver.
 struct ShootingSettings
 {
   double tolerance = 0; // on the full-space residual
   int free_periods = 0;
+  double target_error = 0;     // above 0: of frequency and energy; it ends the iteration as well
+  bool goes_on = true;         // where the first attempt finds no orbit that attracts
+  const char* title = "cycle"; // of the progress
+  Convergence before{};        // of a search that this one goes on with
 };
 
 /// outcome: "converged", "collapsed to equilibrium", "not converged", "not periodic" (T left [T0/2, 2 T0], or there are
@@ -61,7 +65,9 @@ struct ShootingResult
   Orbit free;  // the end of the free motion, evaluated over one more period; null where it is not finite
   Convergence convergence;
   Multipliers multipliers;
-  bool cut_short = false; // the run was asked to end in the search for multipliers
+  bool cut_short = false;                    // the run was asked to end in the search for multipliers
+  StageEnding ending = StageEnding::stalled; // of the attempt that gave the orbit
+  RelativeChange remaining{};                // estimate of what all further steps would change in a solution
 };
 
 /// The problem of finding an orbit near the start. Borrows flow and preconditioner. Collective.
