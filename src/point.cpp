@@ -101,7 +101,7 @@ std::optional<int> starts_sought(const SlidingPoint& point, const Scene& scene)
   const int unstable = point.modes.unstable_count;
   const bool several = std::ranges::count_if(point.modes.unstable(), oscillates) > 1;
   // falling friction drives stick-slip beside sliding that is stable
-  const bool falls = unstable == 0 && steepest_fall(point.model->interface.friction) > 0;
+  const bool falls = unstable == 0 && falls_with_speed(point.model->interface.friction);
   const int starts = several ? std::min(unstable * (unstable + 1) / 2 + random, together) : falls ? 1 + random : 0;
   const double work = (starts + 1) * of_start * work_of_step(point.model->structure);
   return (unstable > 0 || falls) && work <= affordable_work ? std::optional(starts) : std::nullopt;

@@ -184,7 +184,8 @@ template <class Entry> void begin(SweptProblem<Entry>& problem, const ContactSet
   {
     for (const std::size_t pair : turn.own())
       change_reaction(problem, pair,
-                      admissible(work.reaction(pair), velocity_of(problem, pair), work.friction.of(pair)));
+                      first_reaction(work.W.diagonal(pair), work.reaction(pair), velocity_of(problem, pair),
+                                     work.W.directions(), work.friction.of(pair)));
     exchange(problem, turn);
   }
   const Swept swept = agree(problem, problem.changed);

@@ -257,6 +257,7 @@ PairVector solve_pair(const PairBlock& A, const PairVector& q, int directions, c
   const double mu = friction_coefficient(law, 0).value; // of stick
   if (mu == 0 && law.coefficient == 0) return {-q[0] / A[0][0], 0, 0};
   if (const auto r = stick(A, q); r && holds(*r, mu)) return *r;
+  if (has_two_levels(law)) return slip_at(A, q, directions, law.coefficient, last);
   return depends_on_speed(law) ? slip_at_own_speed(A, q, directions, law, last) : slip_at(A, q, directions, mu, last);
 }
 
@@ -266,7 +267,7 @@ ContactStatus contact_status(const PairVector& r, const PairVector& w, const Fri
   const double limit = friction_coefficient(law, 0).value * r[0];
   if (limit - length(r[1], r[2]) <= 1e-8 * largest) return ContactStatus::slip;
   if (!depends_on_speed(law)) return ContactStatus::stick;
-  return length(w[1], w[2]) < 1e-5 * speed_scale(law) ? ContactStatus::stick : ContactStatus::slip;
+  return is_at_rest(law, length(w[1], w[2])) ? ContactStatus::stick : ContactStatus::slip;
 }
 
 std::vector<ContactStatus> contact_status(PairView<const double> reactions, PairView<const double> w,

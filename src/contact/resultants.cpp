@@ -50,6 +50,13 @@ bool leave_out_where_turned(PairView<const double> r, PairView<const double> w, 
   return any;
 }
 
+PairFriction sliding_on(const PairFriction& friction, PairView<const double> past)
+{
+  if (!any_law(friction, has_two_levels)) return friction;
+  const auto without_rest = [](FrictionLaw& law) { law.static_coefficient *= law.decay_speed > 0; };
+  return changed(friction, past.pairs(), without_rest, [&](std::size_t pair) { return !opposes_end(past, pair); });
+}
+
 bool opposes_end(PairView<const double> past, std::size_t pair)
 {
   const std::span<const double> before = past.tangential(pair);

@@ -148,6 +148,13 @@ LimitCycle find_cycle_from(CycleProblem& problem, const CycleOptions& options, c
     const OrbitProblem found_again = problem_of(flow, preconditioner, start, problem.settings.tolerance);
     cycle.spreads = spread_over_offsets({map, found_again, options.shooting, log, cycle.orbit, cycle.measured});
   }
+  if (cycle.multipliers.stability == Stability::stable && cycle.measured.stick_pairs_max > 0 &&
+      any_law(problem.sliding.interface.friction, has_two_levels))
+  {
+    cycle.multipliers.stability = Stability::undecided;
+    cycle.multipliers.would_decide = "friction that falls at once from rest is not seen by the tangent: [cycle] starts "
+                                     "shows which motions attract";
+  }
   cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};
   add_remedies(map, cycle.outcome);
   return cycle;

@@ -24,10 +24,12 @@ struct Iterate
 {
   const ReducedMap& map;
   VectorXd& r;
-  VectorXd& w;      // W r + b
-  double speed = 0; // [m/s] the largest of b
+  VectorXd& w;  // W r + b
+  double speed; // [m/s] the largest of b
+  const std::vector<double>& past;
   int directions = map.model.directions;
-  PairFriction friction = law_of_step(map.model.friction, map.theta);
+  PairFriction friction =
+      law_of_step(sliding_on(map.model.friction, PairView<const double>(past, directions)), map.theta);
   PairRows<Index> rows{directions};
 
   std::size_t pairs() const { return map.own.size(); }
@@ -58,7 +60,8 @@ void admit(Iterate& iterate)
 {
   for (std::size_t pair = 0; pair < iterate.pairs(); ++pair)
     change_reaction(iterate, pair,
-                    admissible(iterate.reaction(pair), iterate.velocity(pair), iterate.friction.of(pair)));
+                    first_reaction(iterate.map.own[pair], iterate.reaction(pair), iterate.velocity(pair),
+                                   iterate.directions, iterate.friction.of(pair)));
 }
 
 /// One sweep over the pairs whose defect exceeds `limit`, each solved whole. The local solves see the symmetric part
@@ -97,7 +100,7 @@ bool solve_contact(const ReducedMap& map, const VectorXd& b, ReducedContact& con
   extrapolate(contact.r, contact.r_before);
   extrapolate(contact.Wr, contact.Wr_before);
   contact.w = b + contact.Wr;
-  Iterate iterate{map, contact.r, contact.w, b.cwiseAbs().maxCoeff()};
+  Iterate iterate{map, contact.r, contact.w, b.cwiseAbs().maxCoeff(), contact.past};
   admit(iterate);
   const double tolerance = map.contact.tolerance;
   double worst = largest_defect(iterate);

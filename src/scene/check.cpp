@@ -41,10 +41,7 @@ public:
       if (tie.slave == tie.master)
         fail(&tie.master, "[[tie]] slave and master are both \"" + tie.slave + "\"; name two surfaces");
     for (const Probe& probe : scene_.probes) check_probe(probe);
-    check_law(scene_.friction,
-              scene_.friction.decay_speed > 0 ? static_cast<const void*>(&scene_.friction.decay_speed)
-                                              : &scene_.friction.static_coefficient,
-              "[friction]");
+    check_law(scene_.friction, &scene_.friction.decay_speed, "[friction]");
     check_damping();
     check_joining(scene_, places_);
     check_transient();
@@ -197,8 +194,8 @@ private:
     { fail(&contact.slip_compliance, "[[contact]] slip_compliance " + std::string(why)); };
     if (!is_undriven(contact)) refuse("is of contacts that stick: one with a rotation or velocity slides");
     if (depends_on_speed(contact.friction ? *contact.friction : scene_.friction))
-      refuse("goes with a friction that does not change with the speed: give the contact its own, without decay_speed "
-             "and factor_at_speed");
+      refuse("goes with a friction that does not change with the speed: give the contact its own, without "
+             "static_coefficient and factor_at_speed");
     if (scene_.cycle.enabled) refuse("is not known to cycles: take it out, or [cycle]");
   }
 
@@ -254,9 +251,11 @@ private:
     if (!at.empty() && (f.static_coefficient > 0 || f.coefficient == 0 || at.front() < 0))
       fail(member, std::string(table) + " factor_at_speed is on a coefficient above 0, of speeds from 0 on, and takes "
                                         "the place of static_coefficient and decay_speed");
-    if ((f.static_coefficient > 0) != (f.decay_speed > 0))
-      fail(member, std::string(table) + " static_coefficient and decay_speed go together: give both, or " +
-                       (table == std::string("[friction]") ? "coefficient" : "friction") + " alone");
+    if (f.decay_speed > 0 && f.static_coefficient == 0)
+      fail(member, std::string(table) + " decay_speed needs the static_coefficient from which friction decays");
+    if (has_two_levels(f) && f.static_coefficient < f.coefficient)
+      fail(member,
+           std::string(table) + " static_coefficient without a decay_speed is at least the friction of sliding");
   }
 
   /// Rayleigh damping is of parts and of given matrices: masses of points and bodies and springs carry none.

@@ -252,7 +252,7 @@ SceneKeys keys_of(Contact& c)
       {"friction", FrictionTarget{&c.friction, &FrictionLaw::coefficient}, "-",
        "the contact's own Coulomb's mu; 0 is a smooth stop; [friction] when absent", not_negative, friction},
       {"static_coefficient", FrictionTarget{&c.friction, &FrictionLaw::static_coefficient}, "-",
-       "its own mu at rest, with a decay_speed", not_negative, friction},
+       "its own mu at rest, as of [friction]", not_negative, friction},
       {"decay_speed", FrictionTarget{&c.friction, &FrictionLaw::decay_speed}, "m/s", "of its own law, as of [friction]",
        not_negative, friction},
       {"factor_at_speed", FrictionTableTarget{&c.friction, &FrictionLaw::factor_at_speed}, "table",
@@ -304,10 +304,10 @@ SceneKeys keys_of(FrictionLaw& f)
       {"coefficient", &f.coefficient, "-", "Coulomb's mu; with a decay_speed its value at high speed", not_negative,
        friction, derive},
       {"static_coefficient", &f.static_coefficient, "-",
-       "mu at rest; it goes with decay_speed, without which mu is constant", not_negative, friction},
+       "mu at rest; without a decay_speed a level of its own, which any sliding leaves", not_negative, friction},
       {"decay_speed", &f.decay_speed, "m/s",
        "mu(s) = coefficient + (static_coefficient - coefficient) exp(-s/decay_speed) at the sliding speed s; 0: "
-       "constant",
+       "`coefficient` at any",
        not_negative, friction},
       {"factor_at_speed", &f.factor_at_speed, "table",
        "mu(s) = coefficient times a factor of the sliding speed s: [[0, 1.5], [0.2, 1]], rows of a speed in m/s and "

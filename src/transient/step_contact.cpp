@@ -139,7 +139,9 @@ bool solve_once(const StepBatch& batch, StepProblem& problem, std::size_t k)
 {
   const auto& [step, interface, factors, works, states, reports] = batch;
   const std::vector<double> b = sum(problem.free, problem.past);
-  const PairFriction law = law_of_step(scaled(interface, factors.friction), step.theta);
+  const PairFriction law = law_of_step(
+      sliding_on(scaled(interface, factors.friction), PairView<const double>(problem.past, interface.directions)),
+      step.theta);
   const ContactResult result = solve_contact(step.W, law, step.contact, {b, states[k].reactions, works[k].memory});
   StepReport& report = reports[k];
   report.contact_iterations += result.iterations;
@@ -227,23 +229,10 @@ std::string solve_all(const StepBatch& batch, std::vector<StepProblem>& problems
 
 PairFriction scaled(const Interface& interface, double factor)
 {
-  const PairFriction& whole = interface.friction;
-  if (factor == 1) return whole;
-  PairFriction result = changed(whole,
-                                [factor](FrictionLaw& law)
-                                {
-                                  law.coefficient *= factor;
-                                  law.static_coefficient *= factor;
-                                });
-  if (!has_undriven_pairs(interface)) return result;
-  result.own.insert(result.own.end(), whole.own.begin(), whole.own.end());
-  result.own.push_back(whole.common);
-  const int laws = static_cast<int>(whole.own.size());
-  result.number_of_own.resize(interface.gap.size(), -1);
-  for (std::size_t i = 0; i < interface.gap.size(); ++i)
-    if (is_undriven(interface, i))
-      result.number_of_own[i] = whole.has_own(i) ? laws + whole.number_of_own[i] : 2 * laws;
-  return result;
+  if (factor == 1) return interface.friction;
+  const auto scale = [factor](FrictionLaw& law) { law.coefficient *= factor, law.static_coefficient *= factor; };
+  return changed(interface.friction, interface.gap.size(), scale,
+                 [&](std::size_t pair) { return !is_undriven(interface, pair); });
 }
 
 std::vector<ContactStatus> status_with(const Interface& interface, const PairFriction& friction, double drive,

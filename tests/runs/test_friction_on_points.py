@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from models import write_scene
+from test_ladder_motion import history_of
 
 
 def three_points(folder, masses, grounds, links, forces, contacts, **tables):
@@ -96,18 +97,40 @@ def test_friction_that_falls_within_a_step_is_no_motion_of_starts(squeal, tmp_pa
     assert report["attractors"]["outcome"] == "refused" and "several solutions" in report["attractors"]["reason"]
 
 
-@pytest.mark.parametrize("speed, frequency", [(1e-3, 16.620), (2e-3, 16.50094)])
-def test_falling_friction_drives_stick_slip_beside_stable_sliding(converged, tmp_path, speed, frequency):
-    """Without a word of the scene, at as many steps as have one solution. The frequencies are of event-driven integration, from
-    displacements above 1.1 V/omega; smaller ones die out."""
-    scene = block_on_belt(tmp_path, 0.538, 6957.0, 5.946, 10.0, 0.05, {"coefficient": 0.2, "static_coefficient": 0.6, "decay_speed": speed},
-                          modes={"band": 100.0}, cycle={})
+@pytest.mark.parametrize("law, cycle, frequency", [({"decay_speed": 1e-3}, {}, 16.620), ({"decay_speed": 2e-3}, {}, 16.50094),
+                                                   ({}, {"steps_per_period": 512}, 16.79377)])
+def test_falling_friction_drives_stick_slip_beside_stable_sliding(converged, tmp_path, law, cycle, frequency):
+    """Without a word of the scene, at as many steps as have one solution; the last law has two levels alone. The frequencies are of
+    event-driven integration, from displacements above 1.1 V/omega; smaller ones die out."""
+    scene = block_on_belt(tmp_path, 0.538, 6957.0, 5.946, 10.0, 0.05, {"coefficient": 0.2, "static_coefficient": 0.6, **law},
+                          modes={"band": 100.0}, cycle=cycle)
     report = converged(scene, ranks=1).report
     assert report["heard"].startswith("silent: no mode grows in the band, but ")
     rest, motion = sorted(report["attractors"]["motions"], key=lambda motion: motion["frequency_hz"])
     assert rest["kind"] == "rest" and motion["kind"] == "steady"
     assert abs(motion["frequency_hz"] - frequency) < motion["frequency_error"] < 0.02 * frequency
 
+
+@pytest.mark.parametrize("rest, sliding, speed, steps", [(0.6, 0.2, 0.05, 100), (0.6, 0.2, 0.05, 400), (0.4, 0.3, 0.02, 200), (0.5, 0.0, 0.1, 150)])
+def test_two_levels_of_friction_have_exact_stick_slip(converged, tmp_path, rest, sliding, speed, steps):
+    """Without damping the block is let go at rest D = (rest - sliding) N/k beyond steady sliding. Sliding that just keeps ahead of the
+    belt goes on: stick would stop it within a step."""
+    omega, beyond = np.sqrt(6957 / 0.538), (rest - sliding) * 10 / 6957
+    period = 2 * beyond / speed + 2 / omega * (np.pi - np.arctan(beyond * omega / speed))
+    swing, fastest = np.hypot(beyond, speed / omega), speed / omega
+    def motion(name, displacement):
+        (tmp_path / name).mkdir()
+        scene = block_on_belt(tmp_path / name, 0.538, 6957.0, 0.0, 10.0, speed, {"coefficient": sliding, "static_coefficient": rest},
+                              modes={"band": 100.0}, initial=[{"on": "block", "displacement": [displacement, 0, 0]}],
+                              transient={"start": "equilibrium", "steps": 12 * steps, "step_size": period / (steps + 0.37)})
+        return history_of(converged(scene, ranks=1), 1e-9)
+    x = motion("sticks", 0.98 * swing)["x"][2 * steps:]
+    assert np.ptp(x) == pytest.approx(2 * swing, rel=3 / steps)
+    x = x - x.mean()
+    ups = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0))
+    assert (ups[-1] - ups[0]) / (len(ups) - 1) == pytest.approx(steps + 0.37, abs=1)
+    slides = motion("slides", 0.99 * fastest)
+    assert np.ptp(slides["x"]) == pytest.approx(1.98 * fastest, rel=20 / steps**2) and not slides["stick"].any()
 
 
 def test_nothing_is_said_of_a_mode_that_is_not_followed(converged, tmp_path):

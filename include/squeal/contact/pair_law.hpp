@@ -68,11 +68,30 @@ template <class Change> PairFriction changed(PairFriction friction, const Change
   return friction;
 }
 
+/// With the laws of some pairs changed.
+template <class Change, class Chosen>
+PairFriction changed(PairFriction friction, std::size_t pairs, const Change& change, const Chosen& is_chosen)
+{
+  const PairFriction others = changed(friction, change);
+  const int laws = static_cast<int>(others.own.size());
+  friction.own.insert(friction.own.end(), others.own.begin(), others.own.end());
+  friction.own.push_back(others.common);
+  friction.number_of_own.resize(pairs, -1);
+  for (std::size_t i = 0; i < pairs; ++i)
+    if (is_chosen(i)) friction.number_of_own[i] = laws + (others.has_own(i) ? others.number_of_own[i] : laws);
+  return friction;
+}
+
+/// Whether any law of them is so.
+template <class Is> bool any_law(const PairFriction& friction, const Is& is)
+{
+  return is(friction.common) || std::ranges::any_of(friction.own, is);
+}
+
 /// Whether a law of them changes with the sliding speed.
 inline bool depends_on_speed(const PairFriction& friction)
 {
-  return depends_on_speed(friction.common) ||
-         std::ranges::any_of(friction.own, [](const FrictionLaw& law) { return depends_on_speed(law); });
+  return any_law(friction, [](const FrictionLaw& law) { return depends_on_speed(law); });
 }
 
 /// The laws of the scene's contacts, by their pairs.
@@ -120,7 +139,8 @@ inline PairFriction friction_of_some(PairFriction friction, const std::vector<in
 // from the last direction; the circle is scanned when that fails.
 //
 // Where mu depends on the speed, stick is accepted by mu(0). Slip has the speed v with |w_t| = v at mu(v), which is
-// unique while |mu'| r_n A_tt < 1. In a step w_t is s_theta/theta: `law_of_step` takes mu at s_theta.
+// unique while |mu'| r_n A_tt < 1. In a step w_t is s_theta/theta: `law_of_step` takes mu at s_theta. Of two levels of
+// mu slip has that of sliding. A pair that slides keeps it until it has turned (`sliding_on`).
 //
 // In a direction in which neither side can move (a zero row of W), r_t opposes the drive while the pair slides along
 // it. It moves nothing there. At rest there, r_t is zero along it.
@@ -132,10 +152,23 @@ inline double length(double x, double y)
   return std::sqrt(x * x + y * y);
 }
 
+/// A speed over which mu changes [m/s]; 0: it is constant. A pair whose mu changes rests below 1e-5 of it.
+inline double speed_scale(const FrictionLaw& law)
+{
+  if (has_two_levels(law)) return 1e-4; // one at which nothing slides
+  return law.decay_speed > 0 || law.factor_at_speed.at.empty() ? law.decay_speed : law.factor_at_speed.at.back();
+}
+
+inline bool is_at_rest(const FrictionLaw& law, double speed)
+{
+  return speed < 1e-5 * speed_scale(law);
+}
+
 /// At a sliding speed [m/s].
 inline FrictionCoefficient friction_coefficient(const FrictionLaw& law, double speed)
 {
   if (!depends_on_speed(law)) return {law.coefficient, 0};
+  if (has_two_levels(law)) return {is_at_rest(law, speed) ? law.static_coefficient : law.coefficient, 0};
   if (law.decay_speed == 0)
     return {law.coefficient * factor_at(law.factor_at_speed, speed),
             law.coefficient * slope_at(law.factor_at_speed, speed)};
@@ -149,7 +182,7 @@ inline double share_of_coefficient(const FrictionLaw& law, double speed)
   return law.decay_speed == 0 ? factor_at(law.factor_at_speed, speed) : 1 - std::exp(-speed / law.decay_speed);
 }
 
-/// The steepest fall of mu(speed) [s/m]; 0 where mu does not fall.
+/// The steepest fall of mu(speed) [s/m]; 0 where mu does not fall, or at once from rest.
 inline double steepest_fall(const FrictionLaw& law)
 {
   double fall = 0; // at a speed that is given: of the line from there
@@ -158,18 +191,19 @@ inline double steepest_fall(const FrictionLaw& law)
   return law.decay_speed == 0 ? fall : std::max(0., law.static_coefficient - law.coefficient) / law.decay_speed;
 }
 
-/// A speed over which mu changes [m/s]; 0: it is constant.
-inline double speed_scale(const FrictionLaw& law)
-{
-  return law.decay_speed > 0 || law.factor_at_speed.at.empty() ? law.decay_speed : law.factor_at_speed.at.back();
-}
-
 /// The steepest fall of all of them.
 inline double steepest_fall(const PairFriction& friction)
 {
   double fall = steepest_fall(friction.common);
   for (const FrictionLaw& law : friction.own) fall = std::max(fall, steepest_fall(law));
   return fall;
+}
+
+/// Whether any falls with the speed, if only from rest.
+inline bool falls_with_speed(const PairFriction& friction)
+{
+  return steepest_fall(friction) > 0 ||
+         any_law(friction, [](const FrictionLaw& law) { return law.static_coefficient > law.coefficient; });
 }
 
 /// The laws as functions of |w_t| where the sliding speed is `part` |w_t|.
@@ -208,7 +242,8 @@ inline double disc_factor(double t1, double t2, double radius)
   return size <= radius ? 1 : radius / size;
 }
 
-/// The reaction with r_n >= 0 and |r_t| <= mu r_n that has r's normal and tangential parts as far as allowed.
+/// The reaction with r_n >= 0 and |r_t| <= mu r_n, mu at the speed of w, that has r's normal and tangential parts as
+/// far as allowed.
 PairVector admissible(PairVector r, const PairVector& w, const FrictionLaw& law);
 
 /// rho of the natural map [force per velocity].
@@ -255,6 +290,14 @@ inline PairVector velocity_without(const PairBlock& A, const PairVector& r, cons
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = 0; j < 3; ++j) q[i] -= A[i][j] * r[j];
   return q;
+}
+
+/// The reaction that iterations start with where `r` gives w = A r + q: admissible, and of two levels of mu stick
+/// before slip.
+inline PairVector first_reaction(const PairBlock& A, const PairVector& r, const PairVector& w, int directions,
+                                 const FrictionLaw& law)
+{
+  return has_two_levels(law) ? solve_pair(A, velocity_without(A, r, w), directions, law, r) : admissible(r, w, law);
 }
 
 /// What a pair does.

@@ -240,21 +240,28 @@ struct Bolt
 };
 
 /// Coulomb's law with mu(s) = coefficient + (static_coefficient - coefficient) exp(-s/decay_speed) at the sliding speed
-/// s, or coefficient times a factor of s.
+/// s, or coefficient times a factor of s. Without a decay_speed a static_coefficient is a level of rest alone, which
+/// any sliding leaves.
 struct FrictionLaw
 {
   double coefficient = 0;          // [-]
   bool direction_damping = true;   // keep mu r_n/|v_d| (I - e e') in the modes (src/README.md, section 3.3)
-  double static_coefficient = 0;   // [-] mu at rest; of no meaning without a decay_speed
+  double static_coefficient = 0;   // [-] mu at rest; 0 without a decay_speed: as in sliding
   double decay_speed = 0;          // [m/s] 0: no such decay
   FactorTable factor_at_speed{};   // [m/s] on the coefficient
   bool slipped_pairs_stick = true; // in modes, of pairs without a drive that slipped on the load path
 };
 
+/// Whether mu has a level of rest and one of sliding, without a law between.
+inline bool has_two_levels(const FrictionLaw& law)
+{
+  return law.decay_speed == 0 && law.static_coefficient > 0;
+}
+
 /// Whether mu changes with the sliding speed.
 inline bool depends_on_speed(const FrictionLaw& law)
 {
-  return law.decay_speed > 0 || !law.factor_at_speed.at.empty();
+  return law.decay_speed > 0 || has_two_levels(law) || !law.factor_at_speed.at.empty();
 }
 
 /// The side of a contact whose nodes have the pairs.
