@@ -1,7 +1,7 @@
 /// Extraction of the scene's parts, surfaces and groups from the element blocks of a mesh file.
 ///
-/// An element whose Jacobian is negative at its middle is numbered inside out; it is then mirrored. A surface face is
-/// mirrored where needed so that it is counter-clockwise seen from outside the solid that has the same corners.
+/// An element whose Jacobian is negative at its middle is numbered inside out; it is then mirrored. A face of a surface
+/// takes the nodes of the element that has its corners: it is counter-clockwise seen from outside a solid.
 #include "squeal/mesh/mesh_file.hpp"
 
 #include "squeal/base/error.hpp"
@@ -18,39 +18,24 @@ namespace squeal
 namespace
 {
 
-/// Advice for elements of a type that squeal has no kernel for.
-std::string remedy(int gmsh_type)
-{
-  switch (gmsh_type)
-  {
-  case 12:
-    return "set Mesh.SecondOrderIncomplete = 1 for 20-node bricks";
-  case 9:
-  case 10:
-  case 16:
-    return "shells are 4- and 3-node: set Mesh.ElementOrder = 1";
-  default:
-    return "squeal has 8- and 20-node bricks, 6-node wedges, 4- and 10-node tetrahedra, 4- and 3-node shells";
-  }
-}
+constexpr const char* known_elements =
+    "solids are bricks, wedges, pyramids and tetrahedra, with or without mid-side nodes; "
+    "shells are 4- and 3-node: set Mesh.ElementOrder = 2 or 1";
 
 /// Whether the Jacobian at the middle of a solid is negative.
 bool is_inside_out(const Element& element, const Mesh& mesh)
 {
-  const std::vector<Eigen::Vector3d> corners = natural_positions(element.shape);
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& corner : corners) middle += corner / static_cast<double>(corners.size());
   const NodePositions x = position_matrix(positions_of(mesh, nodes_of(element)));
-  const Eigen::Matrix3d J = shape_functions(element.shape, middle).dN * x.transpose();
+  const Eigen::Matrix3d J = shape_functions(element.shape, middle_of(element.shape)).dN * x.transpose();
   return J.determinant() < 0;
 }
 
-/// Reverses the orientation of an element or a face.
-template <class Cell> void mirror(Cell& cell)
+/// Reverses the orientation of an element.
+void mirror(Element& element)
 {
-  const auto before = cell.nodes;
-  const std::vector<int> order = mirrored_order(cell.shape);
-  for (std::size_t i = 0; i < order.size(); ++i) cell.nodes[i] = before[order[i]];
+  const auto before = element.nodes;
+  const std::vector<int> order = mirrored_order(element.shape);
+  for (std::size_t i = 0; i < order.size(); ++i) element.nodes[i] = before[order[i]];
 }
 
 /// Index of the part whose name is one of the block's groups; -1 if there is none.
@@ -75,7 +60,7 @@ void add_elements(const ElementBlock& block, int part, const Scene& scene, Mesh&
   const std::optional<Shape> shape = shape_of(block.type);
   if (!shape || dimension_of(*shape) == 1 || (is_shell(*shape) && !mid_sides(*shape).empty()))
     throw Error("part '" + scene.parts[part].name + "' has elements '" + block.type_name +
-                "', for which there is no kernel: " + remedy(block.type));
+                "', for which there is no kernel: " + known_elements);
   const int n = block.nodes_per_element;
   for (std::size_t first = 0; first < block.nodes.size(); first += n)
   {
@@ -136,8 +121,8 @@ void read_elements(const FileMesh& file, const Scene& scene, Mesh& mesh)
 /// A side of an element, which a face of a surface may coincide with.
 struct ElementSide
 {
-  std::vector<int> corners; // counter-clockwise seen from outside the solid
-  int solids = 0;           // number of solid elements that have these corners
+  Face face;      // counter-clockwise seen from outside the solid
+  int solids = 0; // number of solid elements that have these corners
 };
 
 using ElementSides = std::map<std::vector<int>, ElementSide>; // by their corners in ascending order
@@ -153,27 +138,20 @@ std::vector<int> ascending(std::span<const int> nodes)
 ElementSides marked_sides(const Mesh& mesh, const std::vector<char>& marked)
 {
   ElementSides sides;
-  const auto add = [&](const std::vector<int>& corners, int solids)
+  const auto add = [&](const Element& element, std::span<const int> corners, int solids)
   {
-    if (!std::all_of(corners.begin(), corners.end(), [&](int node) { return marked[node]; })) return;
+    if (!std::ranges::all_of(corners, [&](int node) { return marked[node]; })) return;
     ElementSide& side = sides[ascending(corners)];
-    if (!side.solids) side.corners = corners;
+    if (!side.solids) side.face = face_on(element, corners);
     side.solids += solids;
+    side.face.of_shell = side.solids == 0;
   };
   for (const Element& element : mesh.elements)
   {
-    if (is_shell(element.shape)) add({element.nodes.begin(), element.nodes.begin() + corner_count(element.shape)}, 0);
-    for (const std::vector<int>& corners : faces_of(element)) add(corners, 1);
+    if (is_shell(element.shape)) add(element, std::span(element.nodes).first(corner_count(element.shape)), 0);
+    for (const std::vector<int>& corners : faces_of(element)) add(element, corners, 1);
   }
   return sides;
-}
-
-void orient_outward(Face& face, const ElementSide& side)
-{
-  const auto& corners = side.corners;
-  const auto first = std::find(corners.begin(), corners.end(), face.nodes[0]);
-  const auto next = first + 1 == corners.end() ? corners.begin() : first + 1;
-  if (*next != face.nodes[1]) mirror(face);
 }
 
 /// Names of the surfaces that the scene uses; errors in the others do not matter.
@@ -201,26 +179,22 @@ void add_faces(const ElementBlock& block, const std::string& name, const UsedSur
   if (!shape)
   {
     if (!used.all.count(name)) return;
-    throw Error("surface '" + name + "' has faces '" + block.type_name + "', which squeal cannot integrate over" +
-                (block.type == 10 ? ": " + remedy(12) : ""));
+    throw Error("surface '" + name + "' has faces '" + block.type_name +
+                "', which squeal cannot integrate over: " + known_elements);
   }
   const int n = block.nodes_per_element, corners = corner_count(*shape);
   std::size_t without_element = 0, between_solids = 0;
   std::vector<Face>& faces = mesh.surfaces[name];
   for (std::size_t first = 0; first < block.nodes.size(); first += n)
   {
-    Face face{*shape, {}, false};
-    std::copy_n(block.nodes.begin() + first, n, face.nodes.begin());
-    const auto side = sides.find(ascending(std::span(face.nodes).first(corners)));
+    const auto side = sides.find(ascending(std::span(block.nodes).subspan(first, corners)));
     if (side == sides.end())
     {
       ++without_element;
       continue;
     }
     between_solids += side->second.solids > 1;
-    orient_outward(face, side->second);
-    face.of_shell = side->second.solids == 0;
-    faces.push_back(face);
+    faces.push_back(side->second.face);
   }
   if (without_element && used.all.count(name))
     throw Error("surface '" + name + "': " + std::to_string(without_element) +
@@ -266,38 +240,52 @@ void check_doubles(const Mesh& mesh, const Scene& scene)
   }
 }
 
-/// The edges of a solid between two corners, each with its mid-side node or -1. Mid-sides on edges of shells follow
-/// them (squeal/mesh/contact_pairs.hpp).
-std::vector<std::array<int, 3>> edges_of(const Element& element)
+/// Corners of a side or a quadrilateral, ascending after -1, and the node in its middle or -1.
+using MiddleOfSide = std::pair<std::array<int, 4>, int>;
+
+/// Those of a solid. Mid-sides on edges of shells follow them (squeal/mesh/contact_pairs.hpp).
+std::vector<MiddleOfSide> sides_of(const Element& element)
 {
-  std::vector<std::array<int, 3>> edges;
-  const auto add = [&](int a, int b, int middle) { edges.push_back({std::min(a, b), std::max(a, b), middle}); };
-  int middle = corner_count(element.shape);
-  for (const auto& [a, b] : mid_sides(element.shape)) add(element.nodes[a], element.nodes[b], element.nodes[middle++]);
-  if (!edges.empty()) return edges;
+  std::vector<MiddleOfSide> sides;
+  const auto add = [&](std::span<const int> corners, int middle)
+  {
+    auto& [key, node] = sides.emplace_back(std::array{-1, -1, -1, -1}, middle);
+    std::ranges::copy(corners, key.begin());
+    std::ranges::sort(key);
+  };
+  for (int next = corner_count(element.shape); std::vector<int> corners : middles_of(element.shape))
+  {
+    for (int& corner : corners) corner = element.nodes[corner];
+    if (corners.size() <= 4) add(corners, element.nodes[next++]);
+  }
+  const std::size_t middles = sides.size();
   for (const std::vector<int>& face : faces_of(element))
-    for (std::size_t i = 0; i < face.size(); ++i) add(face[i], face[(i + 1) % face.size()], -1);
-  return edges;
+  {
+    for (std::size_t i = 0; middles == 0 && i < face.size(); ++i)
+      add(std::array{face[i], face[(i + 1) % face.size()]}, -1);
+    if (face.size() == 4 && middles == mid_sides(element.shape).size()) add(face, -1);
+  }
+  return sides;
 }
 
-/// Throws Error for a mid-side node on an edge that another solid has without it.
-void check_mid_sides(const Mesh& mesh, const Scene& scene)
+/// Throws Error for a mid-side or mid-face node that another solid does not have there.
+void check_middles(const Mesh& mesh, const Scene& scene)
 {
-  const auto has_mid_sides = [](const Element& element) { return !mid_sides(element.shape).empty(); };
-  if (std::none_of(mesh.elements.begin(), mesh.elements.end(), has_mid_sides)) return;
-  std::map<std::pair<int, int>, std::pair<int, const Element*>> known; // mid-side and element of each edge
+  const auto has_middles = [](const Element& element) { return !middles_of(element.shape).empty(); };
+  if (std::none_of(mesh.elements.begin(), mesh.elements.end(), has_middles)) return;
+  std::map<std::array<int, 4>, std::pair<int, const Element*>> known; // middle and element of each side
   for (const Element& element : mesh.elements)
-    for (const auto& [a, b, middle] : edges_of(element))
+    for (const auto& [side, middle] : sides_of(element))
     {
-      const auto [edge, is_new] = known.emplace(std::pair(a, b), std::pair(middle, &element));
-      const auto& [other_middle, other] = edge->second;
+      const auto [before, is_new] = known.emplace(side, std::pair(middle, &element));
+      const auto& [other_middle, other] = before->second;
       if (other_middle == middle) continue;
       const bool has_it = middle > other_middle; // the other one has none, or a lower one
       const int hanging = std::max(middle, other_middle);
       throw Error(named_part(has_it ? element : *other, scene) + " has the mid-side " +
-                  node_text(hanging, mesh.nodes[hanging]) + " on an edge that " +
+                  node_text(hanging, mesh.nodes[hanging]) + " on " + (side[1] < 0 ? "an edge" : "a face") + " that " +
                   named_part(has_it ? *other : element, scene) +
-                  " has without it: the bodies would part along the edge. Mesh both by elements of one order");
+                  " has without it: the bodies would part there. Mesh both by elements of one order");
     }
 }
 
@@ -343,7 +331,7 @@ Mesh build_mesh(const FileMesh& file, const Scene& scene)
   read_surfaces(file, scene, mesh);
   const std::vector<int> number = drop_unused_nodes(mesh);
   check_doubles(mesh, scene);
-  check_mid_sides(mesh, scene);
+  check_middles(mesh, scene);
   std::map<std::string, std::set<int>> groups, dimensions;
   for (const ElementBlock& block : file.blocks)
     for (const std::string& name : block.groups)

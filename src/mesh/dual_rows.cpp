@@ -37,10 +37,7 @@ std::vector<int> nodes_of_faces(const std::vector<Face>& faces)
 Eigen::Matrix<double, 3, Eigen::Dynamic> multiplier_vectors(const Face& face, std::span<const Vec3> x)
 {
   const std::vector<Vec3> weights = face_weights(face.shape, x);
-  const NodePositions phi = position_matrix(weights);
-  Eigen::Matrix<double, 3, Eigen::Dynamic> chi(3, phi.cols());
-  for (int k = 0; k < 3; ++k) chi.row(k) = multiplier_functions(face.shape, phi.row(k).transpose()).transpose();
-  return chi;
+  return position_matrix(weights) * multiplier_factors(face.shape).transpose();
 }
 
 /// A face beside an edge, and whether it goes along it from the lower node to the higher one.
@@ -185,18 +182,19 @@ void add_face(const CoveredFace& covered, std::span<SlaveRow* const> rows, const
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i]->area += covered.area(static_cast<Eigen::Index>(i));
 }
 
-/// Sets the slave part: of a row the node itself, of a mid-side twice the node less half of each end of its side.
+/// Sets the slave part: what the multipliers' functions weigh the nodes' motions by, u = sum chi_i (T^-1)_ji u_j. Of a
+/// corner that is the node itself, of a mid-side twice the node less half of each end of its side.
 void set_slave_parts(const ContactSurface& slave, std::vector<SlaveRow>& rows)
 {
-  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].slave = {{slave.nodes[i], rows[i].area}};
   for (const Face& face : slave.faces)
   {
-    auto mid = static_cast<std::size_t>(corner_count(face.shape));
-    for (const auto& [a, b] : mid_sides(face.shape))
+    const FaceMatrix inverse = multiplier_factors(face.shape).inverse();
+    for (Eigen::Index i = 0; i < inverse.cols(); ++i)
     {
-      const int node = face.nodes[mid++];
-      SlaveRow& row = rows[slave.place_of(node)];
-      row.slave = {{node, 2 * row.area}, {face.nodes[a], -0.5 * row.area}, {face.nodes[b], -0.5 * row.area}};
+      SlaveRow& row = rows[slave.place_of(face.nodes[i])];
+      row.slave = {{face.nodes[i], inverse(i, i) * row.area}};
+      for (Eigen::Index j = 0; j < i; ++j) // the factors are triangular
+        if (inverse(j, i) != 0) row.slave.push_back({face.nodes[j], inverse(j, i) * row.area});
     }
   }
 }

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace squeal
 {
@@ -153,7 +154,7 @@ Overlap integrate(const SlaveInPlane& slave, const PlacedFace& master, const Nod
       const PlanePoint point = point_of(triangle, corner.N);
       const FaceValues phi = functions_at(slave.face.shape, slave.x, point, slave.size).N;
       const FaceValues N = functions_at(master.shape, x, point, slave.size).N;
-      const FaceValues chi = multiplier_functions(slave.face.shape, phi);
+      const FaceValues chi = multiplier_factors(slave.face.shape) * phi;
       const double gap = x.row(2).dot(N.transpose()) - slave.x.row(2).dot(phi.transpose()), w = weight * jacobian;
       overlap.area += w * chi;
       overlap.gram += w * chi * chi.transpose();
@@ -178,7 +179,7 @@ FaceValues whole_area(const SlaveInPlane& slave)
       phi += weight * twice_area(triangle) * functions_at(slave.face.shape, slave.x, point, slave.size).N;
     }
   }
-  return slave.stretch * multiplier_functions(slave.face.shape, phi);
+  return slave.stretch * multiplier_factors(slave.face.shape) * phi;
 }
 
 Vec3 place_of(const SlaveInPlane& slave, const PlanePoint& at)
@@ -217,18 +218,29 @@ bool oppose(const SlaveInPlane& slave, const PlacedFace& master, const NodePosit
 
 } // namespace
 
-FaceValues multiplier_functions(Shape shape, const FaceValues& N)
+/// A Bernstein polynomial of degree 2 at a node is the chance that two corners, drawn from those that the node is in
+/// the middle of, have the polynomial's node in their middle.
+const FaceMatrix& multiplier_factors(Shape shape)
 {
-  FaceValues chi = N;
-  auto mid = Eigen::Index{corner_count(shape)};
-  for (const auto& [a, b] : mid_sides(shape))
+  static const auto all = []
   {
-    chi(a) += N(mid) / 4;
-    chi(b) += N(mid) / 4;
-    chi(mid) = N(mid) / 2;
-    ++mid;
-  }
-  return chi;
+    std::map<Shape, FaceMatrix> result;
+    for (const Shape face : {Shape::triangle3, Shape::quad4, Shape::triangle6, Shape::quad8, Shape::quad9})
+    {
+      const std::vector<Eigen::Vector3d> places = natural_positions(face);
+      std::vector<std::vector<int>> corners;
+      for (int i = 0; i < corner_count(face); ++i) corners.push_back({i});
+      corners.insert(corners.end(), middles_of(face).begin(), middles_of(face).end());
+      FaceMatrix& T = result[face].setZero(node_count(face), node_count(face));
+      for (std::size_t j = 0; j < places.size(); ++j)
+        for (const int a : corners[j])
+          for (const int b : corners[j])
+            T(std::ranges::find(places, Eigen::Vector3d((places[a] + places[b]) / 2)) - places.begin(), j) +=
+                1. / static_cast<double>(corners[j].size() * corners[j].size());
+    }
+    return result;
+  }();
+  return all.at(shape);
 }
 
 CoveredFace cover_face(const PlacedFace& face, std::span<const PlacedFace> masters, std::span<const int> candidates,

@@ -8,13 +8,13 @@
 namespace squeal
 {
 
-using FaceValues = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 8, 1>;
-using FaceMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 8, 8>;
+using FaceValues = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 9, 1>;
+using FaceMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 9, 9>;
 
-/// The multipliers' functions chi from the shape functions of a face: chi = phi for linear faces. For quadratic ones a
-/// corner takes a quarter of its two mid-sides, and a mid-side keeps half. They are not negative on triangles, and
-/// their integrals are positive.
-FaceValues multiplier_functions(Shape shape, const FaceValues& N);
+/// Factors T of the multipliers' functions chi = T phi: the Bernstein polynomials of the face's order at its nodes. So
+/// chi = phi on linear faces. On quadratic ones a corner takes a quarter of its mid-sides, and a mid-side keeps half.
+/// They are not negative on triangles, and their integrals are positive.
+const FaceMatrix& multiplier_factors(Shape shape);
 
 /// A face with its nodes and what stands of it beside the plane through its corners.
 struct PlacedFace

@@ -1,7 +1,7 @@
 /// Quadrature rules: Gauss-Legendre products, Gauss-Legendre collapsed to simplices, and symmetric rules of degree 2.
 ///
-/// Reference elements: xi_k in [-1, 1] of boxes; xi_k >= 0, sum xi_k <= 1 of simplices; their product of wedges.
-/// Collapsed rules are conical products (Stroud 1971): x = a, y = b (1 - a), z = c (1 - a)(1 - b), a b c in [0, 1].
+/// Reference elements: xi_k in [-1, 1] of boxes; xi_k >= 0, sum xi_k <= 1 of simplices; their product of wedges;
+/// |xi_1|, |xi_2| <= -xi_3 <= 1 of pyramids. Collapsed rules are conical products (Stroud 1971).
 #include "squeal/mesh/shape_functions.hpp"
 
 #include <cmath>
@@ -36,50 +36,59 @@ std::vector<LinePoint> gauss(int n)
 namespace
 {
 
-Rule square(int n)
+/// Product of a rule and a Gauss-Legendre rule of n points along one more coordinate.
+Rule extruded(const Rule& rule, Eigen::Index along, int n)
 {
-  Rule rule;
-  for (const auto& a : gauss(n))
-    for (const auto& b : gauss(n)) rule.push_back({{a.x, b.x, 0}, a.weight * b.weight});
+  Rule result;
+  for (const auto& p : rule)
+    for (const auto& c : gauss(n))
+    {
+      result.push_back({p.xi, p.weight * c.weight});
+      result.back().xi(along) = c.x;
+    }
+  return result;
+}
+
+Rule on_box(int n, Eigen::Index dimension)
+{
+  Rule rule{{Eigen::Vector3d::Zero(), 1}};
+  for (Eigen::Index k = 0; k < dimension; ++k) rule = extruded(rule, k, n);
   return rule;
 }
 
-/// Product of a plane rule and a Gauss-Legendre rule of n points along zeta.
-Rule extruded(const Rule& plane, int n)
+/// The rule with coordinates that go from 0 to 1.
+Rule to_unit(Rule rule, std::initializer_list<Eigen::Index> coordinates)
 {
-  Rule rule;
-  for (const auto& p : plane)
-    for (const auto& c : gauss(n)) rule.push_back({{p.xi(0), p.xi(1), c.x}, p.weight * c.weight});
+  for (auto& [xi, weight] : rule)
+    for (const Eigen::Index k : coordinates) xi(k) = (1 + xi(k)) / 2, weight /= 2;
   return rule;
 }
 
-Rule cube(int n)
+/// The rule with coordinates that shrink to nothing at the end of another one, which goes from 0 to 1.
+Rule collapsed(Rule rule, Eigen::Index along, std::initializer_list<Eigen::Index> shrunk)
 {
-  return extruded(square(n), n);
-}
-
-/// The square's rule collapsed to the unit triangle; it is exact to degree 2 n - 2.
-Rule collapsed_triangle(int n)
-{
-  Rule rule;
-  for (const auto& [xi, weight] : square(n))
-  {
-    const double a = 0.5 * (1 + xi(0)), b = 0.5 * (1 + xi(1));
-    rule.push_back({{a, b * (1 - a), 0}, 0.25 * weight * (1 - a)});
-  }
+  for (auto& [xi, weight] : rule)
+    for (const Eigen::Index k : shrunk) xi(k) *= 1 - xi(along), weight *= 1 - xi(along);
   return rule;
 }
 
-/// The cube's rule collapsed to the unit tetrahedron; it is exact to degree 2 n - 3.
-Rule collapsed_tetrahedron(int n)
+/// It is exact to degree 2 n - 2.
+Rule on_triangle(int n)
 {
-  Rule rule;
-  for (const auto& [xi, weight] : cube(n))
-  {
-    const Eigen::Vector3d t = 0.5 * (xi.array() + 1);
-    const double b = t(1) * (1 - t(0));
-    rule.push_back({{t(0), b, t(2) * (1 - t(0) - b)}, weight / 8 * (1 - t(0)) * (1 - t(0) - b)});
-  }
+  return collapsed(to_unit(on_box(n, 2), {0, 1}), 0, {1});
+}
+
+/// It is exact to degree 2 n - 3.
+Rule on_tetrahedron(int n)
+{
+  return collapsed(collapsed(to_unit(on_box(n, 3), {0, 1, 2}), 1, {2}), 0, {1, 2});
+}
+
+/// It is exact for r^a s^b t^k of shapes.cpp with a, b and k + 2 up to 2 n - 1.
+Rule on_pyramid(int n)
+{
+  Rule rule = collapsed(to_unit(on_box(n, 3), {2}), 2, {0, 1});
+  for (auto& point : rule) point.xi(2) -= 1; // the apex is the origin
   return rule;
 }
 
@@ -115,27 +124,40 @@ std::map<Shape, Quadrature> with_shape_functions(const std::map<Shape, Rule>& ru
 
 const Quadrature& stiffness_rule(Shape shape)
 {
-  static const auto rules = with_shape_functions({{Shape::hex8, cube(2)},
-                                                  {Shape::hex20, cube(3)},
-                                                  {Shape::wedge6, extruded(inner_triangle(), 2)},
+  static const auto rules = with_shape_functions({{Shape::hex8, on_box(2, 3)},
+                                                  {Shape::hex20, on_box(3, 3)},
+                                                  {Shape::hex27, on_box(3, 3)},
+                                                  {Shape::wedge6, extruded(inner_triangle(), 2, 2)},
+                                                  {Shape::wedge15, extruded(on_triangle(3), 2, 3)},
+                                                  {Shape::wedge18, extruded(on_triangle(3), 2, 3)},
+                                                  {Shape::pyramid5, on_pyramid(2)},
+                                                  {Shape::pyramid13, on_pyramid(3)},
+                                                  {Shape::pyramid14, on_pyramid(3)},
                                                   {Shape::tet10, four_point_tetrahedron()},
                                                   {Shape::tet4, {{{0.25, 0.25, 0.25}, 1. / 6}}},
-                                                  {Shape::quad4, square(2)},
+                                                  {Shape::quad4, on_box(2, 2)},
                                                   {Shape::triangle3, mid_side_triangle()}});
   return rules.at(shape);
 }
 
 const Quadrature& mass_rule(Shape shape)
 {
-  static const auto rules = with_shape_functions({{Shape::hex8, cube(3)},
-                                                  {Shape::hex20, cube(3)},
-                                                  {Shape::wedge6, extruded(collapsed_triangle(3), 3)},
-                                                  {Shape::tet10, collapsed_tetrahedron(4)},
+  static const auto rules = with_shape_functions({{Shape::hex8, on_box(3, 3)},
+                                                  {Shape::hex20, on_box(3, 3)},
+                                                  {Shape::hex27, on_box(4, 3)},
+                                                  {Shape::wedge6, extruded(on_triangle(3), 2, 3)},
+                                                  {Shape::wedge15, extruded(on_triangle(4), 2, 4)},
+                                                  {Shape::wedge18, extruded(on_triangle(4), 2, 4)},
+                                                  {Shape::pyramid5, on_pyramid(4)},
+                                                  {Shape::pyramid13, on_pyramid(4)},
+                                                  {Shape::pyramid14, on_pyramid(4)},
+                                                  {Shape::tet10, on_tetrahedron(4)},
                                                   {Shape::tet4, four_point_tetrahedron()},
-                                                  {Shape::quad4, square(3)},
-                                                  {Shape::triangle3, collapsed_triangle(3)},
-                                                  {Shape::quad8, square(3)},
-                                                  {Shape::triangle6, collapsed_triangle(3)}});
+                                                  {Shape::quad4, on_box(3, 2)},
+                                                  {Shape::triangle3, on_triangle(3)},
+                                                  {Shape::quad8, on_box(3, 2)},
+                                                  {Shape::quad9, on_box(3, 2)},
+                                                  {Shape::triangle6, on_triangle(3)}});
   return rules.at(shape);
 }
 
@@ -145,7 +167,7 @@ const Quadrature& triangle_rule(int n)
   {
     std::array<Quadrature, 2> result;
     for (const int points : {3, 4})
-      for (const auto& [xi, weight] : collapsed_triangle(points))
+      for (const auto& [xi, weight] : on_triangle(points))
         result[points - 3].push_back({xi, weight, shape_functions(Shape::triangle3, xi)});
     return result;
   }();

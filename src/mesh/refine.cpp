@@ -1,13 +1,13 @@
-/// Division of every element into similar ones: lines in 2, faces in 4, solids in 8.
+/// Division of every element: lines in 2, faces in 4, solids in 8, pyramids in 6 of their kind and 4 tetrahedra.
 ///
-/// A corner's child is the element shrunk to half its size about that corner. Boxes consist of these; simplices and
-/// wedges leave the middle, which other children fill (Bey, Computing 55 (1995) 355). A tetrahedron's middle, an
-/// octahedron, is divided along its shortest diagonal.
+/// A corner's child is the element shrunk to half its size about that corner. Boxes consist of these; the others leave
+/// the middle, which other children fill (Bey, Computing 55 (1995) 355). A tetrahedron's middle, an octahedron, is
+/// divided along its shortest diagonal. A pyramid's holds one that stands on its apex, and a tetrahedron at each side.
 ///
 /// A new node lies where the parent's shape functions N put it, x = sum of N_i x_i, also on curved sides. Its N is zero
 /// but for nodes of the corner, side or face that it is on, so neighbours agree on the same N_i, which name the node.
-/// All N are multiples of powers of two, hence exact. Caveat: a geometry's curvature beyond the element's own is not
-/// found again.
+/// All N are multiples of powers of two, hence exact, but within a pyramid. Caveat: a geometry's curvature beyond the
+/// element's own is not found again.
 #include "squeal/base/error.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "squeal/mesh/mesh_file.hpp"
@@ -39,13 +39,19 @@ constexpr std::array<std::array<Pair, 2>, 3> diagonals = {{{{{0, 1}, {2, 3}}}, {
 using Middle = std::vector<Child>;
 
 /// Of a tetrahedron by the diagonal.
-std::vector<Middle> middles_of(Shape shape)
+std::vector<Middle> middle_children(Shape shape)
 {
   const Child triangle = {{0, 1}, {1, 2}, {2, 0}}, lower = {{0, 1}, {1, 2}, {2, 0}, {0, 4}, {1, 5}, {2, 3}},
               upper = {{0, 4}, {1, 5}, {2, 3}, {3, 4}, {4, 5}, {5, 3}};
   const int corners = corner_count(shape), dimension = dimension_of(shape);
   if (corners == 3) return {Middle{triangle}};
   if (corners == 6) return {Middle{lower, upper}};
+  if (corners == 5)
+    return {Middle{{{0, 4}, {3, 4}, {2, 4}, {1, 4}, {0, 2}},
+                   {{0, 1}, {0, 4}, {1, 4}, {0, 2}},
+                   {{1, 2}, {1, 4}, {2, 4}, {0, 2}},
+                   {{2, 3}, {2, 4}, {3, 4}, {0, 2}},
+                   {{3, 0}, {3, 4}, {0, 4}, {0, 2}}}};
   if (corners != 4 || dimension != 3) return {Middle{}};
   std::vector<Middle> middles;
   for (std::size_t d = 0; d < 3; ++d)
@@ -63,8 +69,13 @@ std::vector<Middle> middles_of(Shape shape)
 /// Weights of an element's nodes.
 using LocalWeights = std::vector<std::pair<std::size_t, double>>;
 
-/// The nodes of each child.
-using Children = std::vector<std::vector<LocalWeights>>;
+struct ChildElement
+{
+  Shape shape{};
+  std::vector<LocalWeights> nodes{};
+};
+
+using Children = std::vector<ChildElement>;
 
 Children children_of(Shape shape, const Middle& middle)
 {
@@ -80,10 +91,12 @@ Children children_of(Shape shape, const Middle& middle)
   {
     std::vector<Vector3d> places; // natural coordinates
     for (const auto& [a, b] : child) places.emplace_back((parent[a] + parent[b]) / 2);
-    for (const auto& [a, b] : mid_sides(shape)) places.emplace_back((places[a] + places[b]) / 2);
-    for (auto& nodes = children.emplace_back(); const Vector3d& place : places)
+    ChildElement& element = children.emplace_back(shape);
+    if (corners == 5 && child.size() == 4) element.shape = mid_sides(shape).empty() ? Shape::tet4 : Shape::tet10;
+    add_middles(element.shape, places);
+    for (const Vector3d& place : places)
     {
-      LocalWeights& weights = nodes.emplace_back();
+      LocalWeights& weights = element.nodes.emplace_back();
       const NodeValues N = shape_functions(shape, place).N;
       for (Eigen::Index i = 0; i < N.size(); ++i)
         if (N(i) != 0) weights.emplace_back(i, N(i));
@@ -130,19 +143,28 @@ private:
   std::map<NodeWeights, int> numbers_{};
 };
 
-void divide(ElementBlock& block, Shape shape, NewNodes& numbers, const std::vector<Vec3>& places)
+/// Returns blocks of the children, one of each shape.
+std::vector<ElementBlock> divided(const ElementBlock& block, Shape shape, NewNodes& numbers,
+                                  const std::vector<Vec3>& places)
 {
   std::vector<Children> children;
-  for (const Middle& middle : middles_of(shape)) children.push_back(children_of(shape, middle));
+  for (const Middle& middle : middle_children(shape)) children.push_back(children_of(shape, middle));
+  std::map<Shape, ElementBlock> blocks;
   const auto n = static_cast<std::size_t>(block.nodes_per_element);
-  const std::vector<int> parents = std::move(block.nodes);
-  block.nodes = {};
-  for (std::size_t first = 0; first < parents.size(); first += n)
+  for (std::size_t first = 0; first < block.nodes.size(); first += n)
   {
-    const std::span nodes = std::span(parents).subspan(first, n);
-    for (const auto& child : children[children.size() == 1 ? 0 : shortest_diagonal(nodes, places)])
-      for (const LocalWeights& weights : child) block.nodes.push_back(numbers.number_of(nodes, weights));
+    const std::span nodes = std::span(block.nodes).subspan(first, n);
+    for (const ChildElement& child : children[children.size() == 1 ? 0 : shortest_diagonal(nodes, places)])
+    {
+      const ElementBlock empty{block.dimension, gmsh_type(child.shape), block.type_name, node_count(child.shape), {},
+                               block.groups};
+      std::vector<int>& its = blocks.try_emplace(child.shape, empty).first->second.nodes;
+      for (const LocalWeights& weights : child.nodes) its.push_back(numbers.number_of(nodes, weights));
+    }
   }
+  std::vector<ElementBlock> result;
+  for (auto& [of, its] : blocks) result.push_back(std::move(its));
+  return result;
 }
 
 } // namespace
@@ -164,8 +186,13 @@ void refine(FileMesh& mesh, int times)
   {
     mesh.parents.clear();
     NewNodes numbers(mesh);
+    std::vector<ElementBlock> blocks;
     for (ElementBlock& block : mesh.blocks)
-      if (const auto shape = shape_of(block.type)) divide(block, *shape, numbers, mesh.nodes);
+      if (const auto shape = shape_of(block.type))
+        std::ranges::move(divided(block, *shape, numbers, mesh.nodes), std::back_inserter(blocks));
+      else
+        blocks.push_back(std::move(block));
+    mesh.blocks = std::move(blocks);
   }
 }
 

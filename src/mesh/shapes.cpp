@@ -4,12 +4,16 @@
 /// Finite Element Method, volume 1). Their space has the products of powers of the natural coordinates
 ///     on boxes     with the powers 0 and 1, with mid-side nodes at most one power 2 (serendipity)
 ///     on simplices of degree 1, with mid-side nodes 2
-///     on wedges    of degree 1 in the triangle and along it
-/// The factors of the products are multiples of 1/8, hence exact.
+///     on wedges    of degree 1 or 2 in the triangle and along it, with mid-side nodes of at most 3 together
+///     on pyramids  r^a s^b t^k with t = -zeta, r = xi/t, s = eta/t, and a, b <= k <= 1 or 2 (Bedrosian, Int. J. Numer.
+///                  Methods Eng. 35 (1992) 95), with mid-side nodes without r^2 s^2
+/// Shapes that have nodes in the middle of quadrilaterals and boxes, too, leave none of these products out. The apex
+/// of a pyramid is the origin; its base is at zeta = -1. The factors of the products are multiples of 1/8, hence exact.
 /// Caveat: the mid-side nodes of gmsh are not in the order of Abaqus or VTK.
 #include "squeal/mesh/shape_functions.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 namespace squeal
 {
@@ -25,38 +29,53 @@ constexpr Place box[] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
                          {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
 constexpr Place simplex[] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 constexpr Place wedge[] = {{0, 0, -1}, {1, 0, -1}, {0, 1, -1}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
+constexpr Place pyramid[] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1}, {0, 0, 0}};
 
 constexpr Side line_sides[] = {{0, 1}}, triangle_sides[] = {{0, 1}, {1, 2}, {2, 0}},
                quad_sides[] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}},
                tet_sides[] = {{0, 1}, {1, 2}, {2, 0}, {3, 0}, {3, 2}, {3, 1}},
+               pyramid_sides[] = {{0, 1}, {0, 3}, {0, 4}, {1, 2}, {1, 4}, {2, 3}, {2, 4}, {3, 4}},
+               wedge_sides[] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 4}, {2, 5}, {3, 4}, {3, 5}, {4, 5}},
                hex_sides[] = {{0, 1}, {0, 3}, {0, 4}, {1, 2}, {1, 5}, {2, 3},
                               {2, 6}, {3, 7}, {4, 5}, {4, 7}, {5, 6}, {6, 7}};
 
 constexpr CornerFace hex_faces[] = {{0, 3, 2, 1}, {0, 1, 5, 4}, {0, 4, 7, 3}, {1, 2, 6, 5}, {2, 3, 7, 6}, {4, 5, 6, 7}};
 constexpr CornerFace wedge_faces[] = {{0, 2, 1, -1}, {3, 4, 5, -1}, {0, 1, 4, 3}, {0, 3, 5, 2}, {1, 2, 5, 4}};
+constexpr CornerFace pyramid_faces[] = {{0, 1, 4, -1}, {3, 0, 4, -1}, {1, 2, 4, -1}, {2, 3, 4, -1}, {0, 3, 2, 1}};
 constexpr CornerFace tet_faces[] = {{0, 2, 1, -1}, {0, 1, 3, -1}, {0, 3, 2, -1}, {3, 1, 2, -1}};
 
 struct Topology
 {
   int gmsh_type, dimension;
   std::span<const Place> corners;
-  std::span<const Side> mid_sides;
-  std::span<const CornerFace> faces;
+  std::span<const Side> mid_sides{};
+  std::span<const CornerFace> faces{};
+  bool is_full = false; // with a node in the middle of each quadrilateral, and of a box
 };
+
+constexpr std::span line_corners = std::span(box).first(2), quad_corners = std::span(box).first(4),
+                    triangle_corners = std::span(simplex).first(3);
 
 /// In the order of Shape.
 constexpr std::array topologies = {
-    Topology{1, 1, std::span(box).first(2), {}, {}},
-    Topology{8, 1, std::span(box).first(2), line_sides, {}},
-    Topology{2, 2, std::span(simplex).first(3), {}, {}},
-    Topology{3, 2, std::span(box).first(4), {}, {}},
-    Topology{9, 2, std::span(simplex).first(3), triangle_sides, {}},
-    Topology{16, 2, std::span(box).first(4), quad_sides, {}},
+    Topology{1, 1, line_corners},
+    Topology{8, 1, line_corners, line_sides},
+    Topology{2, 2, triangle_corners},
+    Topology{3, 2, quad_corners},
+    Topology{9, 2, triangle_corners, triangle_sides},
+    Topology{16, 2, quad_corners, quad_sides},
+    Topology{10, 2, quad_corners, quad_sides, {}, true},
     Topology{4, 3, simplex, {}, tet_faces},
     Topology{11, 3, simplex, tet_sides, tet_faces},
+    Topology{7, 3, pyramid, {}, pyramid_faces},
+    Topology{19, 3, pyramid, pyramid_sides, pyramid_faces},
+    Topology{14, 3, pyramid, pyramid_sides, pyramid_faces, true},
     Topology{6, 3, wedge, {}, wedge_faces},
+    Topology{18, 3, wedge, wedge_sides, wedge_faces},
+    Topology{13, 3, wedge, wedge_sides, wedge_faces, true},
     Topology{5, 3, box, {}, hex_faces},
     Topology{17, 3, box, hex_sides, hex_faces},
+    Topology{12, 3, box, hex_sides, hex_faces, true},
 };
 
 const Topology& topology(Shape shape)
@@ -68,19 +87,26 @@ const Topology& topology(Shape shape)
 bool has_product(const Topology& t, const Place& powers)
 {
   const auto [a, b, c] = powers;
-  const int order = t.mid_sides.empty() ? 1 : 2;
-  if ((t.dimension < 3 && c > 0) || (t.dimension < 2 && b > 0)) return false;
-  if (t.corners.data() == simplex) return a + b + c <= order;
-  if (t.corners.data() == wedge) return a + b <= 1 && c <= 1;
-  return std::ranges::count(powers, 2) < order;
+  const int order = t.mid_sides.empty() ? 1 : 2, sum = a + b + c; // sum: the power of t on pyramids
+  const Place* const family = t.corners.data();
+  if ((t.dimension < 3 && c != 0) || (t.dimension < 2 && b > 0)) return false;
+  if (family == pyramid) return std::max(a, b) <= sum && sum <= order && (t.is_full || a * b < 4);
+  if (c < 0) return false;
+  if (family == simplex) return sum <= order;
+  if (family == wedge) return std::max(a + b, c) <= order && (t.is_full || sum <= order + 1);
+  return std::max({a, b, c}) <= order && (t.is_full || std::ranges::count(powers, 2) < 2);
 }
 
-/// The product of these powers, or its derivative along a direction; -1: none.
+/// The product of these powers, or its derivative along a direction; -1: none. At the apex of a pyramid 0/0 is 0.
 double product(const Place& powers, const Eigen::Vector3d& xi, int along)
 {
   double value = along < 0 ? 1 : powers[static_cast<std::size_t>(along)];
   for (int k = 0; k < 3; ++k)
-    for (int i = powers[static_cast<std::size_t>(k)] - (k == along ? 1 : 0); i > 0; --i) value *= xi(k);
+  {
+    int power = powers[static_cast<std::size_t>(k)] - (k == along ? 1 : 0);
+    for (; power > 0; --power) value *= xi(k);
+    for (; power < 0 && value != 0; ++power) value /= xi(k);
+  }
   return value;
 }
 
@@ -96,7 +122,7 @@ Polynomials polynomials_of(Shape shape)
   Polynomials result;
   for (int a = 0; a < 3; ++a)
     for (int b = 0; b < 3; ++b)
-      for (int c = 0; c < 3; ++c)
+      for (int c = -2; c < 3; ++c)
         if (has_product(topology(shape), {a, b, c})) result.products.push_back({a, b, c});
   const std::vector<Eigen::Vector3d> nodes = natural_positions(shape);
   Eigen::MatrixXd at_nodes(nodes.size(), result.products.size());
@@ -116,9 +142,14 @@ std::optional<Shape> shape_of(int gmsh_type)
   return static_cast<Shape>(found - topologies.begin());
 }
 
+int gmsh_type(Shape shape)
+{
+  return topology(shape).gmsh_type;
+}
+
 int node_count(Shape shape)
 {
-  return corner_count(shape) + static_cast<int>(mid_sides(shape).size());
+  return corner_count(shape) + static_cast<int>(middles_of(shape).size());
 }
 
 int corner_count(Shape shape)
@@ -163,6 +194,27 @@ std::span<const std::array<int, 4>> corner_faces(Shape shape)
   return topology(shape).faces;
 }
 
+const std::vector<std::vector<int>>& middles_of(Shape shape)
+{
+  static const auto all = []
+  {
+    std::array<std::vector<std::vector<int>>, topologies.size()> result;
+    for (std::size_t i = 0; const Topology& t : topologies)
+    {
+      std::vector<std::vector<int>>& middles = result[i++];
+      for (const auto& [a, b] : t.mid_sides) middles.push_back({a, b});
+      if (!t.is_full) continue;
+      for (const CornerFace& face : t.faces)
+        if (face[3] >= 0) middles.emplace_back(face.begin(), face.end());
+      if (t.corners.data() != box) continue;
+      middles.emplace_back(t.corners.size());
+      std::iota(middles.back().begin(), middles.back().end(), 0);
+    }
+    return result;
+  }();
+  return all[static_cast<std::size_t>(shape)];
+}
+
 std::vector<std::vector<int>> faces_of(const Element& element)
 {
   std::vector<std::vector<int>> faces;
@@ -175,6 +227,28 @@ std::vector<std::vector<int>> faces_of(const Element& element)
   return faces;
 }
 
+Face face_on(const Element& element, std::span<const int> corners)
+{
+  const Topology& solid = topology(element.shape);
+  const auto is_its = [&](const Topology& t)
+  {
+    return t.dimension == 2 && t.corners.size() == corners.size() && t.mid_sides.empty() == solid.mid_sides.empty() &&
+           t.is_full == (solid.is_full && corners.size() == 4);
+  };
+  Face face{static_cast<Shape>(std::ranges::find_if(topologies, is_its) - topologies.begin()), {}, false};
+  auto* next = std::ranges::copy(corners, face.nodes.begin()).out;
+  const auto own = nodes_of(element);
+  for (const std::vector<int>& middle : middles_of(face.shape))
+    for (std::size_t i = solid.corners.size(); const std::vector<int>& other : middles_of(element.shape))
+    {
+      const int node = own[i++];
+      const auto has = [&](int k) { return std::ranges::find(other, k, [&](int c) { return own[c]; }) != other.end(); };
+      if (other.size() == middle.size() && std::ranges::all_of(middle, has, [&](int c) { return corners[c]; }))
+        *next++ = node;
+    }
+  return face;
+}
+
 std::vector<int> mirrored_order(Shape shape)
 {
   const std::vector<Eigen::Vector3d> nodes = natural_positions(shape);
@@ -184,12 +258,30 @@ std::vector<int> mirrored_order(Shape shape)
   return order;
 }
 
+void add_middles(Shape shape, std::vector<Eigen::Vector3d>& corners)
+{
+  for (const std::vector<int>& of : middles_of(shape))
+  {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const int corner : of) sum += corners[static_cast<std::size_t>(corner)];
+    corners.push_back(sum / static_cast<double>(of.size()));
+  }
+}
+
 std::vector<Eigen::Vector3d> natural_positions(Shape shape)
 {
   std::vector<Eigen::Vector3d> places;
   for (const auto& [a, b, c] : topology(shape).corners) places.emplace_back(a, b, c);
-  for (const auto& [a, b] : mid_sides(shape)) places.emplace_back((places[a] + places[b]) / 2);
+  add_middles(shape, places);
   return places;
+}
+
+Eigen::Vector3d middle_of(Shape shape)
+{
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  const auto corners = topology(shape).corners;
+  for (const auto& [a, b, c] : corners) sum += Eigen::Vector3d(a, b, c);
+  return sum / static_cast<double>(corners.size());
 }
 
 ShapeFunctions shape_functions(Shape shape, const Eigen::Vector3d& xi)
@@ -201,7 +293,7 @@ ShapeFunctions shape_functions(Shape shape, const Eigen::Vector3d& xi)
     return result;
   }();
   const auto& [products, factors] = all[static_cast<std::size_t>(shape)];
-  BoundedMatrix<4, 20> values(4, factors.rows()); // rows: the product and its derivatives
+  BoundedMatrix<4, most_nodes> values(4, factors.rows()); // rows: the product and its derivatives
   for (Eigen::Index i = 0; i < values.cols(); ++i)
     for (int row = 0; row < 4; ++row) values(row, i) = product(products[static_cast<std::size_t>(i)], xi, row - 1);
   values = (values * factors).eval();

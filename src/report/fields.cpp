@@ -29,10 +29,17 @@ const std::array xdmf_shapes = {
     XdmfShape{Shape::triangle3, 4},
     XdmfShape{Shape::quad4, 5},
     XdmfShape{Shape::tet4, 6},
+    XdmfShape{Shape::pyramid5, 7},
     XdmfShape{Shape::wedge6, 8},
     XdmfShape{Shape::hex8, 9},
     XdmfShape{Shape::tet10, 38, {0, 1, 2, 3, 4, 5, 6, 7, 9, 8}},
-    XdmfShape{Shape::hex20, 48, {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15}}};
+    XdmfShape{Shape::pyramid13, 39, {0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12}},
+    XdmfShape{Shape::pyramid14, 39, {0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12}}, // without the middle of its base
+    XdmfShape{Shape::wedge15, 40, {0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11}},
+    XdmfShape{Shape::wedge18, 41, {0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16}},
+    XdmfShape{Shape::hex20, 48, {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15}},
+    XdmfShape{Shape::hex27, 50, {0,  1,  2,  3,  4,  5,  6,  7,  8,  11, 13, 9,  16, 18,
+                                 19, 17, 10, 12, 14, 15, 22, 23, 21, 24, 20, 25, 26}}};
 
 constexpr int polyvertex = 1; // followed by its number of nodes
 
@@ -58,8 +65,8 @@ void write_mesh(Hdf5File& file, const Mesh& mesh, Layout& layout)
   {
     const auto& [shape, code, order] = *std::ranges::find(xdmf_shapes, element.shape, &XdmfShape::shape);
     topology.push_back(code);
-    for (std::size_t k = 0; const int node : nodes_of(element))
-      topology.push_back(order.empty() ? node : element.nodes[static_cast<std::size_t>(order[k++])]);
+    if (order.empty()) std::ranges::copy(nodes_of(element), std::back_inserter(topology));
+    for (const int k : order) topology.push_back(element.nodes[static_cast<std::size_t>(k)]);
     part.push_back(element.part);
   }
   for (const auto& [name, node] : mesh.points)

@@ -11,8 +11,8 @@
 /// motion the frequency of a bent element is wrong by (k L)^2 / 12.
 ///
 /// Caveats: wedge6 is stiff in bending within the plane of its triangles, as the constant-strain triangle is; it is for
-/// filling, not for beams. tet4 has constant strains and is stiff in all bending. hex8 is exact in bending as a
-/// parallelepiped and stiffer when tapered (MacNeal 1987), as all 8-node bricks are.
+/// filling, not for beams. tet4 has constant strains and is stiff in all bending; pyramid5 is nearly so. hex8 is exact
+/// in bending as a parallelepiped and stiffer when tapered (MacNeal 1987), as all 8-node bricks are.
 #include "kernels.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 
@@ -102,15 +102,10 @@ SolidGradients mode_gradients(Shape shape, const Eigen::Vector3d& xi)
   return g;
 }
 
-Eigen::Vector3d centre_of_reference(Shape shape)
-{
-  return shape == Shape::wedge6 ? Eigen::Vector3d(1. / 3, 1. / 3, 0) : Eigen::Vector3d(0, 0, 0);
-}
-
 /// Less their mean over the reference element, which is their value at its centre.
 SolidGradients mode_gradients_without_mean(Shape shape, const Eigen::Vector3d& xi)
 {
-  return mode_gradients(shape, xi) - mode_gradients(shape, centre_of_reference(shape));
+  return mode_gradients(shape, xi) - mode_gradients(shape, middle_of(shape));
 }
 
 /// Returns the values of the same modes, which vanish at the nodes.
@@ -133,7 +128,7 @@ Kinematics kinematics(Shape shape, const NodePositions& X, const Matrix6& D)
 {
   Kinematics result{{}, MatrixXd(0, 3 * X.cols())};
   std::vector<SolidStrains> mode_strains;
-  const Eigen::Matrix3d J0 = shape_functions(shape, centre_of_reference(shape)).dN * X.transpose();
+  const Eigen::Matrix3d J0 = shape_functions(shape, middle_of(shape)).dN * X.transpose();
   for (const auto& [xi, weight, at] : stiffness_rule(shape))
   {
     const Eigen::Matrix3d J = at.dN * X.transpose(); // J(k, l) = dx_l / dxi_k

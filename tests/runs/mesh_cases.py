@@ -5,7 +5,8 @@ import math
 
 SECOND_ORDER = "Mesh.ElementOrder = 2; Mesh.SecondOrderIncomplete = 1;"
 ELEMENTS = {"hex8": ("Recombine Surface{:};", "Recombine;", ""), "hex20": ("Recombine Surface{:};", "Recombine;", SECOND_ORDER),
-            "wedge6": ("", "Recombine;", ""), "tet4": ("", "", ""), "tet10": ("", "", SECOND_ORDER)}
+            "wedge6": ("", "Recombine;", ""), "hex27": ("Recombine Surface{:};", "Recombine;", "Mesh.ElementOrder = 2;"),
+            "wedge15": ("", "Recombine;", SECOND_ORDER), "tet4": ("", "", ""), "tet10": ("", "", SECOND_ORDER)}
 
 BAR = """
 n = {n};

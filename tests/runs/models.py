@@ -10,7 +10,8 @@ STEEL = {"young": 210e9, "poisson": 0.3, "density": 7850}
 
 # gmsh's element types: number and dimension
 KINDS = {"point": (15, 0), "line": (1, 1), "triangle": (2, 2), "quad": (3, 2), "brick": (5, 3), "wedge": (6, 3),
-         "brick20": (17, 3), "quad8": (16, 2), "tetrahedron": (4, 3), "triangle6": (9, 2), "tetrahedron10": (11, 3)}
+         "brick20": (17, 3), "quad8": (16, 2), "tetrahedron": (4, 3), "triangle6": (9, 2), "tetrahedron10": (11, 3),
+         "quad9": (10, 2), "brick27": (12, 3), "wedge15": (18, 3), "pyramid": (7, 3), "pyramid13": (19, 3)}
 
 
 class Mesh:
@@ -98,6 +99,36 @@ def tetrahedra10(nodes):
 def triangles6(nodes):
     """6-node triangles, two a cell, of a lattice of twice as many divisions: the faces of tetrahedra10."""
     return _simplices(nodes, ((0, 1), (1, 2), (2, 0)))
+
+
+# Corners of the faces of each shape in gmsh's order, and the corners round the nodes between them (gmsh's manual).
+BRICK_FACES = [(0, 3, 2, 1), (0, 1, 5, 4), (0, 4, 7, 3), (1, 2, 6, 5), (2, 3, 7, 6), (4, 5, 6, 7)]
+BRICK_EDGES = [(0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)]
+TET_FACES, TET_EDGES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)], [(0, 1), (1, 2), (2, 0), (3, 0), (3, 2), (3, 1)]
+WEDGE_FACES = [(0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)]
+WEDGE_EDGES = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)]
+PYRAMID_FACES = [(0, 1, 4), (3, 0, 4), (1, 2, 4), (2, 3, 4), (0, 3, 2, 1)]
+PYRAMID_EDGES = [(0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4)]
+SHAPES = {"brick": (BRICK_FACES, []), "brick20": (BRICK_FACES, BRICK_EDGES), "tetrahedron": (TET_FACES, []),
+          "tet10": (TET_FACES, TET_EDGES), "wedge": (WEDGE_FACES, []), "wedge15": (WEDGE_FACES, WEDGE_EDGES),
+          "pyramid": (PYRAMID_FACES, []), "pyramid13": (PYRAMID_FACES, PYRAMID_EDGES),
+          "brick27": (BRICK_FACES, [*BRICK_EDGES, *BRICK_FACES, tuple(range(8))])}
+# A cell of four divisions a side, its corners and its middle, and how it is cut.
+CELL = np.array([(0, 0, 0), (4, 0, 0), (4, 4, 0), (0, 4, 0), (0, 0, 4), (4, 0, 4), (4, 4, 4), (0, 4, 4), (2, 2, 2)])
+WHOLE, WEDGES = [tuple(range(8))], [(0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7)]
+TETS = [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]
+PYRAMIDS = [(0, 1, 2, 3, 8), (0, 4, 5, 1, 8), (0, 3, 7, 4, 8), (5, 6, 2, 1, 8), (2, 6, 7, 3, 8), (4, 7, 6, 5, 8)]
+
+
+def cell_at(place, cut, shape, nodes):
+    """The nodes of an element in the cell at a place of a lattice of four times as many divisions."""
+    corners = 4 * np.array(place) + CELL[list(cut)]
+    return [nodes[tuple(at)] for at in (*corners, *(corners[list(of)].mean(axis=0).astype(int) for of in SHAPES[shape][1]))]
+
+
+def cells_of(shape, cuts, nodes):
+    """Elements of one shape in all cells of a lattice of four times as many divisions."""
+    return np.array([cell_at(place, cut, shape, nodes) for place in np.ndindex(*((n - 1) // 4 for n in nodes.shape)) for cut in cuts])
 
 
 def closed(nodes):

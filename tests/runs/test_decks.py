@@ -8,6 +8,7 @@ import tomllib
 import numpy as np
 import pytest
 from conftest import load_tool
+from models import SHAPES
 
 TOOL = load_tool("mesh")
 # two bricks of edge 1 above each other, which share no node: the upper one slides on the lower one
@@ -492,11 +493,56 @@ def test_mid_side_nodes_of_ansys_are_all_or_none(tmp_path):
 
 
 def test_degenerate_bricks_of_ansys(tmp_path):
-    """Bricks that repeat corners are wedges and tetrahedra."""
-    rows = [(1, 1, 1, 1, [1, 2, 3, 3, 5, 6, 7, 7]), (2, 1, 1, 1, [9, 10, 11, 11, 13, 13, 13, 13])]
+    """Bricks that repeat corners are wedges, pyramids and tetrahedra."""
+    rows = [(1, 1, 1, 1, [1, 2, 3, 3, 5, 6, 7, 7]), (2, 1, 1, 1, [9, 10, 11, 11, 13, 13, 13, 13]), (3, 1, 1, 1, [1, 2, 3, 4, 5, 5, 5, 5])]
     (tmp_path / "deck.cdb").write_text(cdb(rows))
     model = TOOL.read_deck(tmp_path / "deck.cdb")
-    assert list(model.elements.values()) == [("wedge6", (1, 2, 3, 5, 6, 7)), ("tet4", (9, 10, 11, 13))]
+    assert list(model.elements.values()) == [("wedge6", (1, 2, 3, 5, 6, 7)), ("tet4", (9, 10, 11, 13)), ("pyramid5", (1, 2, 3, 4, 5))]
+
+
+@pytest.mark.parametrize("kind, corners, repeated", [("wedge15", 6, [0, 1, 2, 2, 3, 4, 5, 5]), ("pyramid13", 5, [0, 1, 2, 3, 4, 4, 4, 4]),
+                                                     ("tet10", 4, [0, 1, 2, 2, 3, 3, 3, 3]), ("hex20", 8, range(8))])
+def test_degenerate_bricks_of_ansys_with_mid_sides(tmp_path, kind, corners, repeated):
+    """Every mid-side node of SOLID186 is in the middle of its corners, as the manual draws them, and of gmsh's sides."""
+    sides = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+    at = [np.array(p, float) for p in [(0, 0, 0), (3, 1, 0), (2, 4, 1), (0, 3, 1), (1, 1, 5), (4, 1, 6), (3, 5, 7), (1, 4, 6)][:corners]]
+    nodes, known = [repeated[i] + 1 for i in range(8)], {}
+    for a, b in sides:
+        ends = frozenset((repeated[a], repeated[b]))
+        if len(ends) == 1:
+            nodes.append(repeated[a] + 1)
+            continue
+        if ends not in known:
+            at.append(sum(at[i] for i in ends) / 2)
+            known[ends] = len(at)
+        nodes.append(known[ends])
+    (tmp_path / "deck.cdb").write_text(cdb([(1, 1, 4, 1, nodes)], "", at))
+    model = TOOL.read_deck(tmp_path / "deck.cdb")
+    (found, nodes), = model.elements.values()
+    assert found == kind and len(set(nodes)) == len(nodes) == len(at)
+    of_gmsh = SHAPES[{"hex20": "brick20"}.get(kind, kind)][1]
+    for node, ends in zip(nodes[corners:], of_gmsh):
+        assert model.nodes[node] == pytest.approx((model.nodes[nodes[ends[0]]] + model.nodes[nodes[ends[1]]]) / 2, abs=1e-12)
+
+
+@pytest.mark.parametrize("card, keys, notes", [
+    ("MAT2,3,80.,20.,0.,80.,0.,30.,7.\n,,,,,.02\n", {"young": 75, "poisson": 0.25, "density": 7, "loss_factor": 0.02}, 0),
+    ("MAT2,3,80.,20.,5.,80.,0.,30.,7.\n", {"young": "FILL", "poisson": "FILL", "density": 7}, 1),
+    ("MAT8,3,75.,75.,.25,30.,,,7.\n", {"young": 75, "poisson": 0.25, "density": 7}, 0),
+    ("MAT8,3,75.,60.,.25,30.,,,7.\n", {"young": "FILL", "poisson": "FILL", "density": 7}, 1)])
+def test_materials_of_shells_of_nastran(tmp_path, card, keys, notes):
+    """Isotropic ones are known by their plane stiffness; of others the density remains, and the rest is told."""
+    scene, left_out = converted(tmp_path, "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nCTRIA3,1,1,1,2,3\nPSHELL,1,3,.1,3\n" + card, "deck.bdf")
+    part, = scene["part"]
+    for key, value in keys.items():
+        assert str(part[key]).startswith("FILL IN") if value == "FILL" else part[key] == pytest.approx(value)
+    assert sum("not isotropic" in note for note in left_out) == notes
+
+
+def test_mat9_has_its_loss_factor(tmp_path):
+    text = GRIDS.replace("PSOLID,2,1", "PSOLID,2,9") + "MAT9,9,4.,1.,1.,,,,4.\n,1.,,,,4.,,,\n,2.,,,2.,,2.,1.\n,,,,,,,.03\n"
+    scene, left_out = converted(tmp_path, text, "deck.bdf")
+    assert scene["part"][1]["loss_factor"] == 0.03 and scene["part"][1]["orthotropic"]["shear"] == [2, 2, 2]
 
 
 @pytest.mark.parametrize("name", ["deck.txt", "deck.bdf", "deck"])
@@ -506,7 +552,29 @@ def test_the_reader_is_chosen_by_what_a_file_holds(tmp_path, name):
         assert len(TOOL.read_deck(tmp_path / name).elements) == 2
 
 
-def test_one_brake_in_three_formats(module_run, tmp_path):
+def universal():
+    """The brake's mesh as Salome writes it: solids and faces by groups of elements, the lid and the foot by groups of nodes."""
+    nodes = "".join(f"{i:10d}{1:10d}{1:10d}{11:10d}\n{x:25.16E}{y:25.16E}{z:25.16E}\n" for i, (x, y, z) in enumerate(AT, 1))
+    cells = {1: (115, range(1, 9)), 2: (115, range(9, 17)), 3: (44, (5, 6, 7, 8)), 4: (44, (9, 12, 11, 10))}
+    elements = "".join(f"{n:10d}{kind:10d}{1:10d}{1:10d}{7:10d}{len(of):10d}\n" + "".join(f"{i:10d}" for i in of) + "\n" for n, (kind, of) in cells.items())
+    groups = {"low": [(8, 1)], "high": [(8, 2)], "low_top": [(8, 3)], "high_bottom": [(8, 4)], "base": [(7, n) for n in range(1, 5)],
+              "LID": [(7, n) for n in range(13, 17)]}
+    rows = "".join("".join(f"{v:10d}" for v in (i, 0, 0, 0, 0, 0, 0, len(of))) + f"\n{name}\n"
+                   + "".join(f"{kind:10d}{n:10d}{0:10d}{0:10d}\n" for kind, n in of) for i, (name, of) in enumerate(groups.items(), 1))
+    return "".join(f"    -1\n{number:6d}\n{text}    -1\n" for number, text in ((2411, nodes), (2412, elements), (2467, rows)))
+
+
+def write_med(file):
+    meshio = pytest.importorskip("meshio")
+    cells = [("hexahedron", np.arange(16).reshape(2, 8)), ("quad", np.array([(4, 5, 6, 7), (8, 11, 10, 9)]))]
+    mesh = meshio.Mesh(np.array(AT, float), cells, cell_data={"cell_tags": [np.array([-1, -2]), np.array([-3, -4])]},
+                       point_data={"point_tags": np.repeat([1, 0, 2], (4, 8, 4))})
+    mesh.cell_tags = {-1: ["low"], -2: ["high"], -3: ["low_top"], -4: ["high_bottom"]}
+    mesh.point_tags = {1: ["base"], 2: ["LID"]}
+    meshio.write(file, mesh)
+
+
+def test_one_brake_in_five_formats(module_run, tmp_path):
     """The same mesh, material, coupling, spring, mass, friction and force: the same eigenvalues."""
     inp = BRICKS + ("*COUPLING, CONSTRAINT NAME=c, REF NODE=100, SURFACE=high_top\n*KINEMATIC\n*ELEMENT, TYPE=MASS, ELSET=lump\n50, 100\n"
                     "*MASS, ELSET=lump\n64\n*ELEMENT, TYPE=SPRING1, ELSET=s\n51, 100\n*SPRING, ELSET=s\n3\n1048576.\n*BOUNDARY\n100, 1, 2\n100, 4, 6\n"
@@ -530,7 +598,16 @@ def test_one_brake_in_three_formats(module_run, tmp_path):
     scene = folder / "out" / "scene.toml"
     scene.write_text(scene.read_text() + body)
     found.append(eigenvalues(module_run(slid(scene), ranks=1)))
-    assert len(found[0]) > 3
+    law = "young = 2e11\npoisson = 0.25\ndensity = 7800\n"
+    physics = (f'[mesh]\nfile = "deck.msh"\n[[part]]\nname = "low"\n{law}[[part]]\nname = "high"\n{law}[[support]]\non = "base"\nfixed = "all"\n{body}'
+               '[[contact]]\nrotor = "low_top"\nstator = "high_bottom"\nvelocity = [1, 0, 0]\nfriction = 0.5\n'
+               '[modes]\nmethod = "full"\nband = 2000\n[estimate]\nenabled = false\n')
+    for name, write in (("deck.unv", lambda file: file.write_text(universal())), ("deck.med", write_med)):
+        write(tmp_path / f"of_{name}")
+        subprocess.run([sys.executable, TOOL.__file__, tmp_path / f"of_{name}", tmp_path / f"from_{name}"], check=True)
+        (tmp_path / f"from_{name}" / "scene.toml").write_text(physics.replace("deck.msh", f"of_{name}".replace(name[-3:], "msh")))
+        found.append(eigenvalues(module_run(tmp_path / f"from_{name}" / "scene.toml", ranks=1)))
+    assert len(found) == 5 and len(found[0]) > 3
     for other in found[1:]:
         np.testing.assert_allclose(other, found[0], rtol=1e-10)
 
@@ -583,7 +660,7 @@ def test_universal_files_keep_groups(tmp_path):
 @pytest.mark.parametrize("old, new, words", [
     ("       111         2         1         7         4", "       112         2         1         7         6", ["line 19", "nodes of element 3", "expected 6"]),
     ("wedge\n         8         3         0         0\n", "wedge\n", ["line 30", "0 entities of wedge"]),
-    ("       111 ", "       113 ", ["line 19", "wedges of 15 nodes"]),
+    ("       111 ", "       113 ", ["line 19", "4 nodes of descriptor 113", "expected 15"]),
     ("1.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00\n         3", "x 0 0\n         3", ["line 6", "'x'"]),
 ])
 def test_bad_universal_files_are_refused(tmp_path, old, new, words):

@@ -6,14 +6,17 @@ import tomllib
 import numpy as np
 import pytest
 from conftest import load_tool
-from models import KINDS, STEEL, Mesh, bricks, bricks20, lattice, tetrahedra10, write_scene
+from models import KINDS, PYRAMIDS, STEEL, WEDGES, WHOLE, Mesh, bricks, bricks20, cells_of, lattice, tetrahedra10, write_scene
 
 KINDS.setdefault("tet10", (11, 3))
 LINING = {"young": 5e9, "poisson": 0.25, "density": 2500}
 # Where the other code's nodes stand in gmsh's order, as these codes' manuals draw them.
 ORDERS = {
-    "abaqus": {"brick20": [*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15], "tet10": [*range(8), 9, 8]},
-    "nastran": {"brick20": [*range(8), 8, 11, 13, 9, 10, 12, 14, 15, 16, 18, 19, 17], "tet10": [*range(8), 9, 8]},
+    "abaqus": {"brick20": [*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15], "tet10": [*range(8), 9, 8],
+               "brick27": [*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15, 26, 20, 25, 21, 23, 24, 22],
+               "wedge15": [*range(6), 6, 9, 7, 12, 14, 13, 8, 10, 11]},
+    "nastran": {"brick20": [*range(8), 8, 11, 13, 9, 10, 12, 14, 15, 16, 18, 19, 17], "tet10": [*range(8), 9, 8],
+                "wedge15": [*range(6), 6, 9, 7, 8, 10, 11, 12, 14, 13], "pyramid13": [*range(5), 5, 8, 10, 6, 7, 9, 11, 12]},
 }
 
 TOOL = load_tool("mesh")
@@ -26,10 +29,11 @@ class TwoBlocks:
 
     def __init__(self, kind):
         self.kind, self.mesh = kind, Mesh()
-        double = 1 if kind == "brick" else 2
+        double = {"brick": 1, "brick20": 2, "tet10": 2}.get(kind, 4)
         size = {"plate": ((3, 1, 1), (0.06, 0.04, 0.01), 0.0), "pad": ((2, 1, 1), (0.04, 0.04, 0.012), 0.01)}
         self.cells, self.sets = {}, {}
-        make = {"brick": bricks, "brick20": bricks20, "tet10": tetrahedra10}[kind]
+        make = {"brick": bricks, "brick20": bricks20, "tet10": tetrahedra10}.get(kind) or (
+            lambda nodes: cells_of(kind, {"brick27": WHOLE, "wedge15": WEDGES, "pyramid13": PYRAMIDS}[kind], nodes))
         for name, (divisions, (a, b, c), z) in size.items():
             nodes = self.mesh.add_nodes(lattice([double * n for n in divisions],
                                                 lambda x, y, t: (a * x + 0.004 * t * y, b * y, z + c * t)))
@@ -41,10 +45,10 @@ class TwoBlocks:
     def faces(self, name):
         """Corner and mid-side nodes of the element faces in a set, gmsh's order."""
         wanted, found = set(self.sets[name]), []
-        corners = {"brick": 8, "brick20": 8, "tet10": 4}[self.kind]
+        corners = {"tet10": 4, "wedge15": 6, "pyramid13": 5}.get(self.kind, 8)
         for cell in self.cells[name.split("_")[0]]:
             inside = [n for n in cell[:corners] if n in wanted]
-            if len(inside) == corners // 2 + (corners == 4):
+            if len(inside) == (3 if corners in (4, 6) else 4):
                 found.append((cell, inside))
         return found
 
@@ -61,13 +65,15 @@ class TwoBlocks:
                 if self.kind != "brick":
                     for a, b in zip(around, around[1:] + around[:1]):
                         middle.append(min(cell, key=lambda n: np.linalg.norm(at[n] - (at[a] + at[b]) / 2)))
-                self.mesh.add(name, {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8"}[len(around + middle)], [around + middle])
+                if self.kind == "brick27":
+                    middle.append(min(cell, key=lambda n: np.linalg.norm(at[n] - centre)))
+                self.mesh.add(name, {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}[len(around + middle)], [around + middle])
         self.mesh.add_points("plate_clamp", self.sets["plate_clamp"])
         self.mesh.write(file)
 
     def write_inp(self, file):
         """Two sections, sets over several lines and generated, a surface by faces, one by a set of nodes."""
-        kind = {"brick": "C3D8", "brick20": "C3D20R", "tet10": "C3D10M"}[self.kind]
+        kind = {"brick": "C3D8", "brick20": "C3D20R", "tet10": "C3D10M", "brick27": "C3D27", "wedge15": "C3D15"}[self.kind]
         order = ORDERS["abaqus"].get(self.kind, list(range(8)))
         text = "*HEADING\n two blocks\n*NODE\n"
         text += "".join(f"{i + 1}, {x:.17g}, {y:.17g}, {z:.17g}\n" for i, (x, y, z) in enumerate(self.mesh.nodes))
@@ -85,7 +91,7 @@ class TwoBlocks:
         for name, stuff in (("plate", STEEL), ("pad", LINING)):
             text += f"*MATERIAL, NAME=of_{name}\n*ELASTIC\n{stuff['young']:g}, {stuff['poisson']}\n*DENSITY\n{stuff['density']}\n"
             text += f"*SOLID SECTION, ELSET={name.upper()}, MATERIAL=OF_{name.upper()}\n"
-        if self.kind != "tet10":
+        if self.kind in ("brick", "brick20", "brick27"):
             text += "*SURFACE, NAME=upper\nplate, S2\n"
         text += "*BOUNDARY\nplate_clamp, ENCASTRE\npad_top, 1, 2\n"
         file.write_text(text)
@@ -118,7 +124,7 @@ class TwoBlocks:
 
     def write_bdf(self, file):
         """Small, large and free fields, continuations, lists with THRU."""
-        name_of = {"brick": "CHEXA", "brick20": "CHEXA", "tet10": "CTETRA"}[self.kind]
+        name_of = {"brick": "CHEXA", "brick20": "CHEXA", "tet10": "CTETRA", "wedge15": "CPENTA", "pyramid13": "CPYRAM"}[self.kind]
         order = ORDERS["nastran"].get(self.kind, list(range(8)))
         lines = ["SOL 103", "CEND", "BEGIN BULK", "$HMNAME PROP           1\"plate\" 4", "$HMNAME PROP           2\"pad\" 4"]
         for i, (x, y, z) in enumerate(self.mesh.nodes, 1):
@@ -197,8 +203,7 @@ def completed(scene, names):
     return scene
 
 
-@pytest.mark.parametrize("kind", ["brick", "brick20", "tet10"])
-@pytest.mark.parametrize("code", ["abaqus", "nastran"])
+@pytest.mark.parametrize("kind, code", [("brick", "abaqus"), ("brick", "nastran"), *((kind, code) for code in ORDERS for kind in ORDERS[code])])
 def test_decks_have_the_eigenvalues_of_the_mesh(module_run, expected, tmp_path, kind, code):
     """Orders of nodes, sets, sections, materials and supports: any slip gives other eigenvalues. Nastran's fields have ten
     decimals, which hold these positions."""
@@ -206,7 +211,7 @@ def test_decks_have_the_eigenvalues_of_the_mesh(module_run, expected, tmp_path, 
     deck = tmp_path / ("two.inp" if code == "abaqus" else "two.bdf")
     blocks.write_inp(deck) if code == "abaqus" else blocks.write_bdf(deck)
     scene = convert(deck, tmp_path / "out")
-    upper = "plate_top" if kind == "tet10" else "upper"
+    upper = "upper" if kind.startswith("brick") else "plate_top"
     names = (upper, "pad_bottom", "pad_top") if code == "abaqus" else ("set_11", "set_12", "set_13")
     found = eigenvalues(module_run(completed(scene, names), ranks=1))
     np.testing.assert_allclose(found, expected(kind), rtol=1e-10)
@@ -510,7 +515,7 @@ def test_what_an_input_deck_has_and_the_mesh_has_not_is_named(tmp_path):
 BAD = {
     "no such node": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n9,1,2,3,4\n", ["two.inp, line 4", "node 2"]),
     "an element too short": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D4\n9,1,1,1\n", ["line 4", "3 nodes of C3D4", "expected 4"]),
-    "a kind without a kernel": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D15\n", ["line 3", "C3D15", "4, 6, 8, 10 or 20"]),
+    "a kind without a kernel": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D18\n", ["line 3", "C3D18", "10, 15, 20 or 27"]),
     "a set that is missing": ("*NODE\n1,0,0,0\n*NSET, NSET=a\nb\n", ["line 4", "'b'"]),
     "a word for a number": ("*NODE\n1,0,zero,0\n", ["line 2", "'zero'", "a number"]),
     "a part that is missing": ("*PART, NAME=a\n*NODE\n1,0,0,0\n*END PART\n*INSTANCE, NAME=b, PART=c\n", ["line 5", "'c'", "known are A"]),
@@ -552,7 +557,7 @@ BAD_BULK = {
     "a file that is not there": ("GRID,1\nINCLUDE 'gone.bdf'\n", ["two.bdf, line 2", "gone.bdf"]),
     "points on a line": ("CORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,0.,2.\nGRID,1,7,0.,0.,0.\n", ["line 1", "on a line"]),
     "a system in itself": ("CORD2R,7,7,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\nGRID,1,7,0.,0.,0.\n", ["line 1", "in itself"]),
-    "an element without a kernel": ("GRID,1\nCPYRAM,7,1,1,1,1,1,1\n", ["line 2", "CPYRAM 7", "no element in squeal"]),
+    "an element without a kernel": ("GRID,1\nCPYRAM,7,1,1,1,1,1,1,1\n,1\n", ["line 2", "CPYRAM 7", "7 nodes", "5 or 13"]),
     "a word for a number": ("GRID,1,,x,0.,0.\n", ["line 1", "GRID, field 4", "'x'"]),
     "a node at two places": ("GRID,1\nGRID,1,,1.,0.,0.\n", ["line 2", "node 1", "line 1", "one position"]),
     "a material twice": ("GRID,1\nMAT1,1,1.,,.3\nMAT1,1,2.,,.3\n", ["line 3", "MAT1 1", "line 2", "keep one"]),

@@ -151,9 +151,10 @@ def test_the_period_that_was_kept_is_called_what_it_is(run, title, closed):
     assert plot_basis.is_closed(run) == closed
 
 
-# One element of each kind, its nodes in VTK's order: corners of the unit cube, wedge and tetrahedron, then middles.
+# One element of each kind, its nodes in VTK's order: corners of the unit cube, wedge, pyramid and tetrahedron, then middles.
 CUBE = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)], float)
 WEDGE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)], float)
+PYRAMID = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1)], float)
 TETRA = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
 
 
@@ -163,6 +164,9 @@ def with_middles(corners, edges):
 
 @pytest.mark.parametrize("code, nodes, faces, volume, area", [
     (9, CUBE, 6, 1, 6), (48, with_middles(CUBE, surface.HEX_EDGES), 6, 1, 6), (8, WEDGE, 5, 0.5, 3 + np.sqrt(2)),
+    (50, np.concatenate([with_middles(CUBE, surface.HEX_EDGES), np.full((7, 3), 9.0)]), 6, 1, 6),
+    (40, with_middles(WEDGE, surface.WEDGE_EDGES), 5, 0.5, 3 + np.sqrt(2)), (7, PYRAMID, 5, 1 / 3, 2 + np.sqrt(2)),
+    (39, with_middles(PYRAMID, surface.PYRAMID_EDGES), 5, 1 / 3, 2 + np.sqrt(2)),
     (6, TETRA, 4, 1 / 6, 1.5 + np.sqrt(3) / 2), (38, with_middles(TETRA, surface.TETRA_EDGES), 4, 1 / 6, 1.5 + np.sqrt(3) / 2)])
 def test_the_surface_of_one_element(code, nodes, faces, volume, area):
     """Outward faces enclose its volume (Gauss), and the parts of its nodes are its area."""

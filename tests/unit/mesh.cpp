@@ -22,42 +22,41 @@ std::vector<Vec3> reference(Shape shape)
   {
   case Shape::hex8:
   case Shape::hex20:
+  case Shape::hex27:
     x = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
     break;
   case Shape::wedge6:
+  case Shape::wedge15:
+  case Shape::wedge18:
     x = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
+    break;
+  case Shape::pyramid5:
+  case Shape::pyramid13:
+  case Shape::pyramid14:
+    x = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}};
     break;
   default:
     x = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   }
-  for (const auto& [a, b] : mid_sides(shape)) x.push_back(0.5 * (x[a] + x[b]));
+  for (const std::vector<int>& corners : middles_of(shape))
+  {
+    Vec3 at{};
+    for (const int corner : corners) at = at + 1. / static_cast<double>(corners.size()) * x[corner];
+    x.push_back(at);
+  }
   return x;
 }
 
-int gmsh_type(Shape shape)
-{
-  switch (shape)
-  {
-  case Shape::hex8:
-    return 5;
-  case Shape::wedge6:
-    return 6;
-  case Shape::hex20:
-    return 17;
-  case Shape::tet4:
-    return 4;
-  default:
-    return 11;
-  }
-}
+const std::map<Shape, double> volumes = {
+    {Shape::hex8, 1},           {Shape::hex20, 1},        {Shape::hex27, 1},         {Shape::wedge6, 1. / 2},
+    {Shape::wedge15, 1. / 2},   {Shape::wedge18, 1. / 2}, {Shape::pyramid5, 1. / 3}, {Shape::pyramid13, 1. / 3},
+    {Shape::pyramid14, 1. / 3}, {Shape::tet10, 1. / 6},   {Shape::tet4, 1. / 6}};
 
 } // namespace
 
 TEST_CASE("corner faces enclose the reference cell, outward")
 {
-  const std::map<Shape, double> volume = {
-      {Shape::hex8, 1}, {Shape::wedge6, 1. / 2}, {Shape::hex20, 1}, {Shape::tet10, 1. / 6}, {Shape::tet4, 1. / 6}};
-  for (const auto& [shape, expected] : volume)
+  for (const auto& [shape, expected] : volumes)
   {
     const std::vector<Vec3> x = reference(shape);
     double sum = 0; // divergence theorem, faces cut into triangles
@@ -69,7 +68,7 @@ TEST_CASE("corner faces enclose the reference cell, outward")
 
 TEST_CASE("a solid numbered inside out is mended, mid-sides too")
 {
-  for (const Shape shape : {Shape::hex8, Shape::wedge6, Shape::hex20, Shape::tet10, Shape::tet4})
+  for (const auto& [shape, volume] : volumes)
   {
     FileMesh file;
     file.nodes = reference(shape);
@@ -81,12 +80,14 @@ TEST_CASE("a solid numbered inside out is mended, mid-sides too")
     const Mesh mesh = build_mesh(file, scene);
     const Element& mended = mesh.elements.at(0);
     const auto x = [&](int i) { return mesh.nodes[mended.nodes[i]]; };
-    CHECK(dot(cross(x(1) - x(0), x(shape == Shape::hex8 || shape == Shape::hex20 ? 3 : 2) - x(0)),
-              x(corner_count(shape) == 8 ? 4 : 3) - x(0)) == 1);
-    for (std::size_t i = 0; i < mid_sides(shape).size(); ++i) // coordinates are halves: exact
+    const int corners = corner_count(shape);
+    const bool quadrilateral = corners == 8 || corners == 5; // first face
+    CHECK(dot(cross(x(1) - x(0), x(quadrilateral ? 3 : 2) - x(0)), x(quadrilateral ? 4 : 3) - x(0)) == 1);
+    for (int i = corners; const std::vector<int>& of : middles_of(shape)) // coordinates are halves: exact
     {
-      const auto [a, b] = mid_sides(shape)[i];
-      CHECK(norm(x(corner_count(shape) + static_cast<int>(i)) - 0.5 * (x(a) + x(b))) == 0);
+      Vec3 at{};
+      for (const int corner : of) at = at + 1. / static_cast<double>(of.size()) * x(corner);
+      CHECK(norm(x(i++) - at) == 0);
     }
   }
 }

@@ -13,11 +13,11 @@ using namespace small_fem;
 namespace
 {
 
-const std::vector<std::pair<std::string, Shape>> solids = {{"hex8", Shape::hex8},
-                                                           {"wedge6", Shape::wedge6},
-                                                           {"hex20", Shape::hex20},
-                                                           {"tet10", Shape::tet10},
-                                                           {"tet4", Shape::tet4}};
+const std::vector<std::pair<std::string, Shape>> solids = {
+    {"hex8", Shape::hex8},           {"wedge6", Shape::wedge6},       {"hex20", Shape::hex20},
+    {"tet10", Shape::tet10},         {"tet4", Shape::tet4},           {"pyramid5", Shape::pyramid5},
+    {"pyramid13", Shape::pyramid13}, {"pyramid14", Shape::pyramid14}, {"wedge15", Shape::wedge15},
+    {"wedge18", Shape::wedge18},     {"hex27", Shape::hex27}};
 
 /// Unit cube of 7 bricks, the inner one skew (MacNeal and Harder 1985).
 small_fem::Mesh patch_of_bricks()
@@ -173,6 +173,9 @@ Eigen::VectorXd end_load(const small_fem::Mesh& mesh, double length, const std::
       {Shape::hex8, {Shape::quad4, {1, 2, 6, 5}}},
       {Shape::wedge6, {Shape::quad4, {1, 2, 5, 4}}},
       {Shape::hex20, {Shape::quad8, {1, 2, 6, 5, 11, 14, 18, 12}}},
+      {Shape::hex27, {Shape::quad9, {1, 2, 6, 5, 11, 14, 18, 12, 23}}},
+      {Shape::wedge15, {Shape::quad8, {1, 2, 5, 4, 9, 11, 14, 10}}},
+      {Shape::pyramid13, {Shape::quad8, {0, 3, 2, 1, 6, 10, 8, 5}}},
       {Shape::tet10, {Shape::triangle6, {1, 2, 3, 5, 8, 9}}}};
   const auto& [face, local] = ends.at(mesh.shape);
   Eigen::VectorXd load = Eigen::VectorXd::Zero(3 * Eigen::Index(mesh.x.size()));
@@ -240,7 +243,8 @@ TEST_CASE("a straight cantilever of six elements stretches and bends as beam the
   // holds the width of the section and, coarsely meshed, of a whole element. Without the modes 90 % would be missing.
   const Eigen::Vector3d hex8 = cantilever(Shape::hex8, {6, 1, 1});
   for (int k = 0; k < 3; ++k) CHECK(hex8(k) == approx(1, 0.03));
-  for (const Shape shape : {Shape::hex20, Shape::tet10}) // the clamp's hold is felt a little more by full integration
+  // the clamp's hold is felt a little more by full integration
+  for (const Shape shape : {Shape::hex20, Shape::tet10, Shape::hex27, Shape::wedge15, Shape::pyramid13})
   {
     const Eigen::Vector3d ratio = cantilever(shape, {6, 1, 1});
     for (int k = 0; k < 3; ++k) CHECK(ratio(k) == approx(1, 0.045));
@@ -258,7 +262,7 @@ TEST_CASE("the linear wedge is stiff in bending and converges")
 TEST_CASE("a straight cantilever twists by Saint-Venant's torsion")
 {
   // one element across has the warping y z alone and gives 0.858 of it; six by four leave 2 %, and the clamp's hold
-  for (const Shape shape : {Shape::hex8, Shape::hex20, Shape::tet10})
+  for (const Shape shape : {Shape::hex8, Shape::hex20, Shape::tet10, Shape::hex27, Shape::wedge15, Shape::pyramid13})
   {
     CHECK(twist(shape) == approx(1, 0.04));
   }
@@ -281,6 +285,33 @@ TEST_CASE("the twisted beam of 12 x 2 x 1 bricks bends as beam theory says")
     const double unit = 1 / (thickness * width);
     CHECK(tip({0, unit, 0}) == approx(0.0054244, 0.02));
     CHECK(tip({0, 0, unit}) == approx(0.0017533, 0.02));
+  }
+}
+
+TEST_CASE(
+    "frequencies of a cube between rollers converge with the second power of the size, quadratic elements' fourth")
+{
+  // u = (sin pi x cos pi y, -cos pi x sin pi y, 0) and its like have no volume change: omega^2 = 2 pi^2 G/rho, three
+  // times. Orders of two meshes are a few tenths off their limit.
+  const double exact = std::sqrt(1e9 / 2.6 / 1000 * 2) / 2;
+  const auto error = [&](Shape shape, int n)
+  {
+    const auto mesh = in_shape(bricks({n, n, n}, [](double x, double y, double z) { return Vec3{x, y, z}; }), shape);
+    Prescribed rollers;
+    for (std::size_t i = 0; i < mesh.x.size(); ++i)
+      for (int k = 0; k < 3; ++k)
+        if (std::abs(mesh.x[i][k]) < 1e-12 || std::abs(mesh.x[i][k] - 1) < 1e-12) rollers[3 * int(i) + k] = 0;
+    const auto f = frequencies(assemble({mesh, {1e9, 0.3, 1000}, 0}), rollers, 3, 0);
+    return (f[0] + f[1] + f[2]) / 3 / exact - 1;
+  };
+  for (const auto& [name, shape] : solids)
+  {
+    const bool linear = middles_of(shape).empty();
+    const int n = linear ? 4 : 2;
+    const double coarse = std::abs(error(shape, n)), fine = std::abs(error(shape, 2 * n));
+    CAPTURE(name);
+    CHECK(std::log2(coarse / fine) > (linear ? 1.7 : 3.3));
+    CHECK(fine < (linear ? 0.05 : 0.004));
   }
 }
 

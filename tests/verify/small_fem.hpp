@@ -20,6 +20,8 @@ namespace small_fem
 
 using squeal::Shape;
 using squeal::Vec3;
+using squeal::operator+;
+using squeal::operator*;
 
 struct Mesh
 {
@@ -106,24 +108,40 @@ inline Mesh recut(const Mesh& mesh, Shape shape, const std::vector<std::vector<i
   return finer;
 }
 
-/// Straight mid-side nodes on the given edges, shared between neighbours.
-inline Mesh with_middles(Mesh mesh, Shape shape, const std::vector<std::array<int, 2>>& edges)
+/// Nodes in the middle of sides, faces and boxes as the shape has them, shared between neighbours.
+inline Mesh with_middles(Mesh mesh, Shape shape)
 {
   mesh.shape = shape;
-  std::map<std::pair<int, int>, int> middles;
+  std::map<std::vector<int>, int> middles;
   for (auto& element : mesh.elements)
-    for (const auto& [a, b] : edges)
+    for (std::vector<int> corners : squeal::middles_of(shape))
     {
-      const auto ends = std::minmax(element[a], element[b]);
-      const auto [place, is_new] = middles.try_emplace({ends.first, ends.second}, static_cast<int>(mesh.x.size()));
+      for (int& corner : corners) corner = element[corner];
+      std::sort(corners.begin(), corners.end());
+      const auto [place, is_new] = middles.try_emplace(corners, static_cast<int>(mesh.x.size()));
       if (is_new)
       {
-        const Vec3 p = mesh.x[ends.first], q = mesh.x[ends.second];
-        mesh.x.push_back({(p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2});
+        Vec3 sum{};
+        for (const int corner : corners) sum = sum + mesh.x[corner];
+        mesh.x.push_back((1. / static_cast<double>(corners.size())) * sum);
       }
       element.push_back(place->second);
     }
   return mesh;
+}
+
+/// Each brick as six pyramids, whose apex is its middle.
+inline Mesh pyramids(Mesh mesh)
+{
+  for (auto& element : mesh.elements)
+  {
+    Vec3 middle{};
+    for (const int node : element) middle = middle + 0.125 * mesh.x[node];
+    element.push_back(static_cast<int>(mesh.x.size()));
+    mesh.x.push_back(middle);
+  }
+  return recut(mesh, Shape::pyramid5,
+               {{0, 1, 2, 3, 8}, {0, 4, 5, 1, 8}, {0, 3, 7, 4, 8}, {5, 6, 2, 1, 8}, {2, 6, 7, 3, 8}, {4, 7, 6, 5, 8}});
 }
 
 /// A brick mesh as the same domain in another solid shape; mid-sides in gmsh's order.
@@ -133,14 +151,21 @@ inline Mesh in_shape(const Mesh& bricks, Shape shape)
   {
   case Shape::wedge6:
     return recut(bricks, shape, {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 4, 6, 7}});
+  case Shape::wedge15:
+  case Shape::wedge18:
+    return with_middles(in_shape(bricks, Shape::wedge6), shape);
+  case Shape::pyramid5:
+    return pyramids(bricks);
+  case Shape::pyramid13:
+  case Shape::pyramid14:
+    return with_middles(pyramids(bricks), shape);
   case Shape::hex20:
-    return with_middles(
-        bricks, shape,
-        {{0, 1}, {0, 3}, {0, 4}, {1, 2}, {1, 5}, {2, 3}, {2, 6}, {3, 7}, {4, 5}, {4, 7}, {5, 6}, {6, 7}});
+  case Shape::hex27:
+    return with_middles(bricks, shape);
   case Shape::tet4:
     return recut(bricks, shape, {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6}, {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}});
   case Shape::tet10:
-    return with_middles(in_shape(bricks, Shape::tet4), shape, {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {2, 3}, {1, 3}});
+    return with_middles(in_shape(bricks, Shape::tet4), shape);
   default:
     return bricks;
   }

@@ -79,7 +79,8 @@ double relative_product(Mat A, Vec x)
   return largest_of_product(A, x) / (norm_of(A) * norm_of(x));
 }
 
-const std::array shapes = {Shape::hex8, Shape::wedge6, Shape::hex20, Shape::tet10, Shape::tet4};
+const std::array shapes = {Shape::hex8, Shape::wedge6,  Shape::hex20, Shape::tet10,
+                           Shape::tet4, Shape::wedge15, Shape::hex27, Shape::pyramid13};
 
 /// |lambda| of the pairs that are found, ascending.
 std::vector<double> pairs_of(Built built, double band)

@@ -15,7 +15,7 @@ from squeal.abaqus_properties import frame_of, read_materials, read_sections
 from squeal.deck_files import Problem, blocks_of, number, span, undefined, whole
 from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model
 
-SOLIDS = {"4": "tet4", "6": "wedge6", "8": "hex8", "10": "tet10", "20": "hex20"}
+SOLIDS = {"4": "tet4", "5": "pyramid5", "6": "wedge6", "8": "hex8", "10": "tet10", "15": "wedge15", "20": "hex20", "27": "hex27"}
 SHELLS = {"3": "tri3", "4": "quad4"}
 SKINS = {"3": "tri3", "4": "quad4", "6": "tri6", "8": "quad8"}
 NAMED_SUPPORTS = {"ENCASTRE": "x y z rx ry rz", "PINNED": "x y z", "XSYMM": "x ry rz", "YSYMM": "y rx rz", "ZSYMM": "z rx ry",
@@ -40,7 +40,7 @@ def kind_of(name, place):
     """The kind of an element type, None if it is no mesh of solids, shells or surfaces."""
     if solid := re.match(r"[CD]C?3D(\d+)", name):
         if solid[1] not in SOLIDS:
-            raise Problem(f"{place}: elements {name}: expected solids with 4, 6, 8, 10 or 20 nodes")
+            raise Problem(f"{place}: elements {name}: expected solids with 4, 5, 6, 8, 10, 15, 20 or 27 nodes")
         return SOLIDS[solid[1]]
     if shell := re.match(r"(?:S|STRI)(\d)", name):
         if shell[1] not in SHELLS:

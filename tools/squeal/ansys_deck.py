@@ -21,9 +21,13 @@ TARGETS, CONTACTS = {169, 170}, {171, 172, 173, 174, 175, 177}
 SKINS = {152, 154}
 ELASTIC = {"EX": "young", "PRXY": "poisson", "NUXY": "poisson", "DENS": "density", "DMPR": "loss_factor", "BETD": "beta", "ALPD": "alpha"}
 ORTHOTROPIC = ("EX", "EY", "EZ", "PRXY", "PRXZ", "PRYZ", "GXY", "GXZ", "GYZ")
-# hexahedra that stand for wedges and tetrahedra: which of their corners and mid-sides are the other's
-WEDGE_OF = [0, 1, 2, 4, 5, 6]
-TET_OF = [0, 1, 2, 4]
+# what bricks stand for where corners repeat, by the first place of each: a kind, its corners and its mid-sides
+DEGENERATE = {
+    (0, 1, 2, 3, 4, 5, 6, 7): ("hex8", "hex20", range(8), range(12)),
+    (0, 1, 2, 2, 4, 5, 6, 6): ("wedge6", "wedge15", (0, 1, 2, 4, 5, 6), (0, 1, 3, 4, 5, 7, 8, 9, 10)),
+    (0, 1, 2, 3, 4, 4, 4, 4): ("pyramid5", "pyramid13", range(5), (0, 1, 2, 3, 8, 9, 10, 11)),
+    (0, 1, 2, 2, 4, 4, 4, 4): ("tet4", "tet10", (0, 1, 2, 4), (0, 1, 3, 8, 9, 10)),
+}
 SILENT = set("/COM /NOPR /GOPR /PREP7 /TITLE /SOLU /GO /OUTPUT /UNITS /VIEW /AUTO FINISH NUMOFF *IF *ELSE *ENDIF DOF MPTEMP "
              "EXTOPT TREF IRLF BFUNIF CGLOC KUSE TIME CRPLIM NCNV "
              "NEQIT ERESX TOFFST ANTYPE LSCLEAR FCUM DELTIM KBC SHPP SHELL "
@@ -199,19 +203,13 @@ def kind_of(kind, nodes, place):
     quadratic = any(mids) and kind != 285
     if few == 4:
         return ("tet10", corners + mids) if quadratic else ("tet4", corners)
-    different = len(set(corners))
-    if different == 8:
-        return ("hex20", corners + mids) if quadratic else ("hex8", corners)
-    if different == 6 and corners[2] == corners[3] and corners[6] == corners[7]:
-        if quadratic:
-            raise Problem(f"{place}: a wedge of 15 nodes, which has no element in squeal: expected linear wedges or tetrahedra")
-        return "wedge6", [corners[i] for i in WEDGE_OF]
-    if different == 4 and len(set(corners[4:])) == 1 and corners[2] == corners[3]:
-        if quadratic:  # edges IJ, JK, KI, IM, JM, KM
-            return "tet10", [corners[i] for i in TET_OF] + [mids[i] for i in (0, 1, 3, 8, 9, 10)]
-        return "tet4", [corners[i] for i in TET_OF]
-    raise Problem(f"{place}: an element of {different} corners, which has no element in squeal: expected tetrahedra, wedges "
-                  "or bricks")
+    found = DEGENERATE.get(tuple(map(corners.index, corners)))
+    if not found:
+        raise Problem(f"{place}: an element of {len(set(corners))} corners, which are not those of a tetrahedron, pyramid, wedge or brick")
+    linear, parabolic, kept, kept_mids = found
+    if quadratic:
+        return parabolic, [corners[i] for i in kept] + [mids[i] for i in kept_mids]
+    return linear, [corners[i] for i in kept]
 
 
 def add_element(deck, place, label, attributes, nodes):

@@ -8,7 +8,8 @@ from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model, Part, corners_of, ord
 from squeal.msh_mesh import KIND_OF, read_mesh
 from squeal.scene import with_numbers
 
-TYPES = {"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8", "hex20": "C3D20", "wedge6": "C3D6", "tri3": "S3", "quad4": "S4"}
+TYPES = {"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8", "hex20": "C3D20", "wedge6": "C3D6", "wedge15": "C3D15",
+         "pyramid5": "C3D5", "hex27": "C3D27", "tri3": "S3", "quad4": "S4"}
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 WRITTEN = set("title gravity numbers mesh part point rigid_body coupling spring connector beam mass support force pressure bolt rotor contact "
               "step tie friction damping modes".split())

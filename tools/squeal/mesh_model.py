@@ -1,8 +1,8 @@
 """A mesh with its parts, surfaces, sets, materials and boundary conditions, between the decks of other codes and gmsh's
 format 4.1.
 
-Node orders: Abaqus, VTK (meshio) and gmsh list the mid-side nodes of 10-node tetrahedra and 20-node bricks by other edges,
-and Nastran those of bricks. An order is here the list of the edges whose mid-side nodes follow the corners.
+Node orders: codes number the nodes between corners of quadratic elements by other edges. An order is here the list of the
+corners in whose middles the nodes behind the corners are.
 """
 
 import numpy as np
@@ -10,42 +10,53 @@ from squeal.common import counted
 from squeal.deck_files import Problem
 from squeal.deck_joints import Joints
 
-BOTTOM, TOP = [(0, 1), (1, 2), (2, 3), (3, 0)], [(4, 5), (5, 6), (6, 7), (7, 4)]
-UP = [(0, 4), (1, 5), (2, 6), (3, 7)]
-TET_EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]  # of Abaqus, Nastran and VTK
-EDGES = {
-    "abaqus": {"tet10": TET_EDGES, "hex20": BOTTOM + TOP + UP},
-    "nastran": {"tet10": TET_EDGES, "hex20": BOTTOM + UP + TOP},
-    "vtk": {"tet10": TET_EDGES, "hex20": BOTTOM + TOP + UP},
-    "gmsh": {"tet10": [(0, 1), (1, 2), (2, 0), (3, 0), (3, 2), (3, 1)],
-             "hex20": [(0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)]},
-}
 # gmsh's type, number of corners, number of nodes, faces by corners in the order of Abaqus's S1, S2, …
 KINDS = {
     "tet4": (4, 4, 4, [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)]),
     "hex8": (5, 8, 8, [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)]),
     "wedge6": (6, 6, 6, [(0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)]),
+    "pyramid5": (7, 5, 5, [(0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)]),
 }
 KINDS["tet10"] = (11, 4, 10, KINDS["tet4"][3])
 KINDS["hex20"] = (17, 8, 20, KINDS["hex8"][3])
-FLAT = {"tri3": (2, 3, 3), "quad4": (3, 4, 4), "tri6": (9, 3, 6), "quad8": (16, 4, 8)}
-FACE_OF_SIZE = {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8"}
+KINDS["hex27"] = (12, 8, 27, KINDS["hex8"][3])
+KINDS["wedge15"] = (18, 6, 15, KINDS["wedge6"][3])
+KINDS["pyramid13"] = (19, 5, 13, KINDS["pyramid5"][3])
+BOTTOM, TOP = [(0, 1), (1, 2), (2, 3), (3, 0)], [(4, 5), (5, 6), (6, 7), (7, 4)]
+UP = [(0, 4), (1, 5), (2, 6), (3, 7)]
+TET_EDGES = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]  # of Abaqus, Nastran and VTK
+PYRAMID_EDGES = [*BOTTOM, *((i, 4) for i in range(4))]  # of all but gmsh
+BELOW, ABOVE, BESIDE = [(0, 1), (1, 2), (2, 0)], [(3, 4), (4, 5), (5, 3)], [(0, 3), (1, 4), (2, 5)]  # of wedges
+WHOLE = tuple(range(8))
+MIDDLES = {
+    "abaqus": {"tet10": TET_EDGES, "hex20": BOTTOM + TOP + UP, "wedge15": BELOW + ABOVE + BESIDE, "pyramid13": PYRAMID_EDGES,
+               "hex27": [*BOTTOM, *TOP, *UP, WHOLE, *KINDS["hex8"][3]]},
+    "nastran": {"tet10": TET_EDGES, "hex20": BOTTOM + UP + TOP, "wedge15": BELOW + BESIDE + ABOVE, "pyramid13": PYRAMID_EDGES},
+    "gmsh": {"tet10": [(0, 1), (1, 2), (2, 0), (3, 0), (3, 2), (3, 1)],
+             "hex20": [(0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)],
+             "wedge15": [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)],
+             "pyramid13": [(0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4)]},
+}
+MIDDLES["vtk"] = MIDDLES["abaqus"] | {"hex27": [*BOTTOM, *TOP, *UP, *(KINDS["hex8"][3][i] for i in (5, 3, 2, 4, 0, 1)), WHOLE]}
+MIDDLES["gmsh"]["hex27"] = [*MIDDLES["gmsh"]["hex20"], *(KINDS["hex8"][3][i] for i in (0, 2, 5, 3, 4, 1)), WHOLE]
+FLAT = {"tri3": (2, 3, 3), "quad4": (3, 4, 4), "tri6": (9, 3, 6), "quad8": (16, 4, 8), "quad9": (10, 4, 9)}
+FACE_OF_SIZE = {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8", 9: "quad9"}
 MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def gmsh_order(kind, code):
     """Where gmsh's nodes of an element stand in the order of another code."""
     corners, nodes = (KINDS.get(kind) or FLAT[kind])[1:3]
-    if kind not in EDGES["gmsh"]:
+    if kind not in MIDDLES["gmsh"]:
         return list(range(nodes))
-    place = {frozenset(edge): corners + i for i, edge in enumerate(EDGES[code][kind])}
-    return [*range(corners), *(place[frozenset(edge)] for edge in EDGES["gmsh"][kind])]
+    place = {frozenset(of): corners + i for i, of in enumerate(MIDDLES[code][kind])}
+    return [*range(corners), *(place[frozenset(of)] for of in MIDDLES["gmsh"][kind])]
 
 
 def order_back(kind):
     """Where Abaqus's nodes of an element stand in gmsh's order."""
     order = gmsh_order(kind, "abaqus")
-    return [order.index(i) for i in range(len(order))] if kind in EDGES["gmsh"] else list(range(len(order)))
+    return [order.index(i) for i in range(len(order))] if kind in MIDDLES["gmsh"] else list(range(len(order)))
 
 
 class Part:
@@ -98,17 +109,17 @@ class Model:
         self.elements[number] = (kind, tuple(nodes[i] for i in gmsh_order(kind, code)))
 
     def faces(self, number):
-        """Faces of a solid element in Abaqus's order, each with the mid-side nodes of its edges behind its corners; of a
-        flat one itself."""
+        """Faces of a solid element in Abaqus's order, each with the nodes in the middles of its edges and its own behind its
+        corners; of a flat one itself."""
         kind, nodes = self.elements[number]
         if kind in FLAT:
             return [nodes]
         corners = KINDS[kind][1]
-        mid = {frozenset(edge): nodes[corners + i] for i, edge in enumerate(EDGES["gmsh"].get(kind, []))}
+        mid = {frozenset(of): nodes[corners + i] for i, of in enumerate(MIDDLES["gmsh"].get(kind, []))}
         found = []
         for face in KINDS[kind][3]:
-            edges = [frozenset((face[i], face[(i + 1) % len(face)])) for i in range(len(face))]
-            found.append(tuple(nodes[i] for i in face) + tuple(mid[edge] for edge in edges if edge in mid))
+            sides = [frozenset((face[i], face[(i + 1) % len(face)])) for i in range(len(face))]
+            found.append(tuple(nodes[i] for i in face) + tuple(mid[of] for of in (*sides, frozenset(face)) if of in mid))
         return found
 
     def solids(self):
@@ -325,7 +336,7 @@ def sorted_corners(corners):
 
 
 def corners_of(face):
-    return frozenset(face[: {6: 3, 8: 4}.get(len(face), len(face))])
+    return frozenset(face[: {6: 3, 8: 4, 9: 4}.get(len(face), len(face))])
 
 
 # ---- gmsh's format 4.1

@@ -8,7 +8,8 @@ from squeal.deck_files import Problem
 from squeal.mesh_model import FLAT, KINDS, Model, Part
 
 CELLS = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedron20": "hex20", "wedge": "wedge6",
-         "triangle": "tri3", "quad": "quad4", "triangle6": "tri6", "quad8": "quad8"}
+         "hexahedron27": "hex27", "wedge15": "wedge15", "pyramid": "pyramid5", "pyramid13": "pyramid13",
+         "triangle": "tri3", "quad": "quad4", "triangle6": "tri6", "quad8": "quad8", "quad9": "quad9"}
 LEFT_OUT = ("vertex", "line", "line3")
 MOST_VALUES = 100  # of an array of whole numbers that is taken for groups: more are numbers of the elements
 

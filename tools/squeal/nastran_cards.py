@@ -5,7 +5,7 @@ import re
 import numpy as np
 from squeal.deck_files import Problem, included, lines_of, node_table, number, whole
 
-ELEMENTS = ("CHEXA", "CPENTA", "CTETRA", "CPYRAM", "CQUAD4", "CTRIA3", "CTRIA6", "CQUAD8", "CQUADR", "CTRIAR")
+ELEMENTS = ("CHEXA", "CPENTA", "CTETRA", "CPYRAM", "CPYRA", "CQUAD4", "CTRIA3", "CTRIA6", "CQUAD8", "CQUADR", "CTRIAR")
 BLANK = b" " * 8
 
 

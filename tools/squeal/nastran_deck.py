@@ -14,15 +14,15 @@ from squeal.mesh_model import FLAT, MOTIONS, Model, corners_of
 from squeal.nastran_cards import Placed, Systems, cards_of, is_blank, nastran_nodes, sections_of, table_of, wholes
 from squeal.nastran_properties import note_shell_fields, read_materials, read_properties
 
-ELEMENTS = {("CHEXA", 8): "hex8", ("CHEXA", 20): "hex20", ("CPENTA", 6): "wedge6", ("CTETRA", 4): "tet4",
+ELEMENTS = {("CHEXA", 8): "hex8", ("CHEXA", 20): "hex20", ("CPENTA", 6): "wedge6", ("CPENTA", 15): "wedge15", ("CPYRAM", 5): "pyramid5",
+            ("CPYRAM", 13): "pyramid13", ("CPYRA", 5): "pyramid5", ("CPYRA", 13): "pyramid13", ("CTETRA", 4): "tet4",
             ("CTETRA", 10): "tet10", ("CQUAD4", 4): "quad4", ("CTRIA3", 3): "tri3", ("CTRIA6", 6): "tri6", ("CTRIA6", 3): "tri3", ("CQUAD8", 8): "quad8",
             ("CQUAD8", 4): "quad4", ("CQUADR", 4): "quad4", ("CTRIAR", 3): "tri3"}
 CORNERS = {"CHEXA": (8, 20), "CPENTA": (6, 15), "CTETRA": (4, 10), "CQUAD4": (4, 4), "CTRIA3": (3, 3), "CTRIA6": (6, 6),
-           "CQUAD8": (8, 8), "CQUADR": (4, 4), "CTRIAR": (3, 3), "CPYRAM": (5, 13)}
+           "CQUAD8": (8, 8), "CQUADR": (4, 4), "CTRIAR": (3, 3), "CPYRAM": (5, 13), "CPYRA": (5, 13)}
 LINEAR_SHELLS = ("CQUAD4", "CTRIA3", "CQUADR", "CTRIAR")  # whose fields behind the nodes are others
 UPPER = {"EIGRL": 4, "EIGRA": 4, "EIGR": 5}  # fields of the highest frequency
-WITHOUT_ELEMENT = {("CPENTA", 15), ("CPYRAM", 5), ("CPYRAM", 13)}
-READ = {*UPPER, "GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "CORD1R", "CORD1C", "CORD1S", "PSOLID", "PSHELL", "MAT1", "MAT9", "MATORT", "SPC", "SPC1", "SPCADD",
+READ = {*UPPER, "GRID", "GRDSET", "CORD2R", "CORD2C", "CORD2S", "CORD1R", "CORD1C", "CORD1S", "PSOLID", "PSHELL", "MAT1", "MAT2", "MAT8", "MAT9", "MATORT", "SPC", "SPC1", "SPCADD",
         "SET1", "SET3", "PARAM", "ENDDATA", *CORNERS, *nastran_joining.READ, *nastran_bolts.READ, *nastran_contacts.READ}
 
 
@@ -79,7 +79,7 @@ class Deck:
 
     def face_of(self, number, grids):
         """The face of an element that two grids name: opposite corners, of triangles one corner, of tetrahedra one
-        corner and the node that is off the face."""
+        corner and the node that is off the face; of pyramids one corner of the base, or two of a triangle."""
         kind, nodes = self.model.elements.get(number, (None, ()))
         if kind is None or not set(grids) <= set(nodes):
             return None
@@ -89,6 +89,9 @@ class Deck:
             corners = face[: len(corners_of(face))]
             if kind.startswith("tet"):
                 if len(grids) == 2 and grids[0] in corners and grids[1] not in corners:
+                    return face
+            elif kind.startswith("pyramid") and len(grids) == 1:
+                if len(corners) == 4 and grids[0] in corners:
                     return face
             elif len(grids) == 1 and len(corners) == 3 and grids[0] in corners:
                 return face
@@ -175,9 +178,7 @@ def read_element(card, model, of_property):
         texts = texts[:fewest]
     if (card.name, len(texts)) not in ELEMENTS:
         known = [str(count) for name, count in ELEMENTS if name == card.name]
-        lacking = [str(count) for name, count in sorted(WITHOUT_ELEMENT) if name == card.name]
-        raise Problem(f"{card.place}: {card.name} {card.field(2)} has {len(texts)} nodes; expected {' or '.join([*known, *lacking])}"
-                      + (f", of which {' and '.join(lacking)} have no element in squeal" if lacking else ""))
+        raise Problem(f"{card.place}: {card.name} {card.field(2)} has {len(texts)} nodes; expected {' or '.join(known)}")
     nodes = [card.whole(4 + i) for i in range(len(texts))]
     number = card.whole(2)
     model.add_element(card.place, number, ELEMENTS[card.name, len(texts)], nodes, "nastran")

@@ -37,8 +37,30 @@ def read_materials(cards, deck):
                                           "loss_factor": card.number(9, 0.0)}
     for card in by_number(cards, "MAT9", "MATORT").values():
         constants, density = constants_of(card, deck)
-        if constants:
-            model.materials[card.field(2)] = {"orthotropic": constants, "density": density * mass}
+        loss = card.number(32, 0.0) if card.name == "MAT9" else 0.0
+        model.materials[card.field(2)] = constants | {"density": density * mass, "loss_factor": loss}
+    for card in by_number(cards, "MAT2", "MAT8").values():
+        loss = card.number(14 if card.name == "MAT2" else 18, 0.0)
+        model.materials[card.field(2)] = flat_constants(card, deck) | {"density": card.number(9, 0.0) * mass, "loss_factor": loss}
+
+
+def flat_constants(card, deck):
+    """Of shells: MAT2 with G11 G12 G13 G22 G23 G33, MAT8 with E1 E2 NU12 G12. Young's modulus and Poisson's ratio where they are
+    isotropic, as squeal's shells are; the constants of others stand for what the scene lacks."""
+    if card.name == "MAT8":
+        first, second, nu, shear = (card.number(i, 0.0) for i in (3, 4, 5, 6))
+        across = [card.number(i, 0.0) or shear for i in (7, 8)]
+        found = {"orthotropic": {"young": [first, second, second], "poisson": [nu, nu, nu], "shear": [shear, *across]}}
+    else:
+        g11, g12, g13, second, g23, shear = (card.number(i, 0.0) for i in range(3, 9))
+        nu, found = g12 / (second or 1), {}
+        first, second = g11 - nu * g12, second - nu * g12
+        if abs(g13) + abs(g23) > 1e-6 * abs(g11):
+            second = 0.0  # not isotropic
+    if abs(first - second) <= 1e-6 * first and abs(shear - first / (2 * (1 + nu))) <= 1e-6 * first:
+        return {"young": first, "poisson": nu}
+    deck.note(f"{card.name} {card.field(2)}, which is not isotropic as squeal's shells are", card)
+    return found
 
 
 def constants_of(card, deck):
@@ -47,7 +69,7 @@ def constants_of(card, deck):
         young = [card.number(i) for i in (3, 4, 5)]
         nu12, nu23, nu31 = (card.number(i, 0.0) for i in (6, 7, 8))
         shear = [card.number(i) for i in (10, 12, 11)]
-        return {"young": young, "poisson": [nu12, nu31 * young[0] / young[2], nu23], "shear": shear}, card.number(9, 0.0)
+        return {"orthotropic": {"young": young, "poisson": [nu12, nu31 * young[0] / young[2], nu23], "shear": shear}}, card.number(9, 0.0)
     upper, stiffness, i = np.zeros((6, 6)), None, 3
     for row in range(6):
         for column in range(row, 6):
@@ -56,11 +78,12 @@ def constants_of(card, deck):
     mixed = np.abs(stiffness[:3, 3:]).max() + np.abs(np.triu(stiffness[3:, 3:], 1)).max()
     if mixed or np.linalg.matrix_rank(stiffness) < 6:
         deck.note(f"MAT9 {card.field(2)}, whose axes couple tension and shear", card)
-        return None, 0.0
+        return {}, card.number(24, 0.0)
     compliance = np.linalg.inv(stiffness[:3, :3])
     young = 1 / np.diag(compliance)
     poisson = [float(-compliance[a, b] * young[a]) for a, b in ((0, 1), (0, 2), (1, 2))]
-    return {"young": young.tolist(), "poisson": poisson, "shear": [stiffness[3, 3], stiffness[5, 5], stiffness[4, 4]]}, card.number(24, 0.0)
+    constants = {"young": young.tolist(), "poisson": poisson, "shear": [stiffness[3, 3], stiffness[5, 5], stiffness[4, 4]]}
+    return {"orthotropic": constants}, card.number(24, 0.0)
 
 
 def by_number(cards, *names):

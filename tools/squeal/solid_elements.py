@@ -1,6 +1,6 @@
 """Solid elements as fields.h5 has them: shape functions, rules of integration, strains, elasticity.
 
-Strains are xx yy zz xy yz zx, shears in full. The incompatible modes of 8-node bricks and of wedges are part of the strain, as
+Strains are xx yy zz xy yz zx, shears in full. The incompatible modes of 8-node bricks and 6-node wedges are part of the strain, as
 src/solid/README.md tells: their amplitudes follow from the nodes' displacements.
 """
 
@@ -11,30 +11,35 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from squeal.surface import HEX_EDGES, TETRA_EDGES
+from squeal.surface import HEX_EDGES, PYRAMID_EDGES, TETRA_EDGES, WEDGE_EDGES
 
 Rule = tuple[np.ndarray, np.ndarray]  # points and weights of the reference element
 
 
-def _exponents(allowed: Callable[[tuple[int, ...]], bool]) -> np.ndarray:
-    return np.array([powers for powers in product(range(3), repeat=3) if allowed(powers)])
+def _exponents(allowed: Callable[[tuple[int, ...]], bool], lowest: int = 0) -> np.ndarray:
+    return np.array([powers for powers in product(range(3), range(3), range(lowest, 3)) if allowed(powers)])
 
 
 TETRA4 = _exponents(lambda p: sum(p) <= 1)
 TETRA10 = _exponents(lambda p: sum(p) <= 2)
 BRICK8 = _exponents(lambda p: max(p) <= 1)
 BRICK20 = _exponents(lambda p: max(p) <= 1 or sorted(p)[1] <= 1)
+BRICK27 = _exponents(lambda p: True)
 WEDGE6 = _exponents(lambda p: p[0] + p[1] <= 1 and p[2] <= 1)
+WEDGE15 = _exponents(lambda p: p[0] + p[1] <= 2 and sum(p) <= 3)
+WEDGE18 = _exponents(lambda p: p[0] + p[1] <= 2)
+PYRAMID5 = _exponents(lambda p: max(p[:2]) <= sum(p) <= 1, -1)  # the apex is the origin: src/mesh/shapes.cpp
+PYRAMID13 = _exponents(lambda p: max(p[:2]) <= sum(p) <= 2 and p[0] * p[1] < 4, -2)
 
 CUBE = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)], float)
 PRISM = np.array([(0, 0, -1), (1, 0, -1), (0, 1, -1), (0, 0, 1), (1, 0, 1), (0, 1, 1)], float)
 SIMPLEX = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
-PRISM_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
+APEX = np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (0, 0, 0)], float)
 ROOT = 1 / np.sqrt(3)
 
 
-def with_middles(corners: np.ndarray, edges: tuple[tuple[int, int], ...]) -> np.ndarray:
-    return np.concatenate([corners, [(corners[a] + corners[b]) / 2 for a, b in edges]])
+def with_middles(corners: np.ndarray, sides: tuple[tuple[int, ...], ...]) -> np.ndarray:
+    return np.concatenate([corners, [corners[list(side)].mean(axis=0) for side in sides]])
 
 
 def brick_rule(n: int) -> Rule:
@@ -63,22 +68,37 @@ def _prism_rule() -> Rule:
     return np.array([(*place, z) for place in triangle for z in (-ROOT, ROOT)]), np.full(6, 1 / 6)
 
 
+def collapsed_prism_rule(n: int) -> Rule:
+    """The brick's with y shrunk to nothing at x = 1."""
+    points, weights = brick_rule(n)
+    x, y = (points[:, :2].T + 1) / 2
+    return np.stack([x, y * (1 - x), points[:, 2]], axis=1), weights / 4 * (1 - x)
+
+
+def pyramid_rule(n: int) -> Rule:
+    """The brick's shrunk to nothing at the apex."""
+    points, weights = brick_rule(n)
+    t = (points[:, 2] + 1) / 2
+    return np.stack([points[:, 0] * t, points[:, 1] * t, -t], axis=1), weights / 2 * t**2
+
+
 @dataclass(frozen=True)
 class Solid:
     """A kind of solid element. centre: of the reference element."""
 
     corners: np.ndarray
-    edges: tuple[tuple[int, int], ...]  # between corners; of quadratic elements in the order of their mid-side nodes
+    edges: tuple[tuple[int, ...], ...]  # between corners; of quadratic elements in the order of their mid-side nodes
     exponents: np.ndarray  # of the monomials that span the shape functions
     order: int
     rule: Rule
     samples: np.ndarray  # where strains are better than elsewhere
     centre: np.ndarray
     modes: int = 0  # incompatible ones
+    middles: tuple[tuple[int, ...], ...] = ()  # corners round the nodes behind the mid-side ones
 
     @cached_property
     def nodes(self) -> np.ndarray:
-        return with_middles(self.corners, self.edges) if self.order == 2 else self.corners
+        return with_middles(self.corners, (*self.edges, *self.middles)) if self.order == 2 else self.corners
 
     @cached_property
     def _coefficients(self) -> np.ndarray:
@@ -89,7 +109,7 @@ class Solid:
         parts = []
         for k in range(3):
             lowered = self.exponents.copy()
-            lowered[:, k] = np.maximum(lowered[:, k] - 1, 0)
+            lowered[:, k] -= lowered[:, k] != 0
             parts.append(monomials(xi, lowered) * self.exponents[:, k] @ self._coefficients)
         return np.stack(parts, axis=1)
 
@@ -99,7 +119,7 @@ class Solid:
 
     def corner_values(self, xi: np.ndarray) -> np.ndarray:
         """The linear functions of the corners, which sum to one."""
-        linear = BRICK8 if len(self.corners) == 8 else WEDGE6 if len(self.corners) == 6 else TETRA4
+        linear = {8: BRICK8, 6: WEDGE6, 5: PYRAMID5, 4: TETRA4}[len(self.corners)]
         return monomials(xi, linear) @ np.linalg.inv(monomials(self.corners, linear))
 
     def mode_gradients(self, xi: np.ndarray) -> np.ndarray:
@@ -116,20 +136,30 @@ class Solid:
 THIRD = np.array([1 / 3, 1 / 3, 0])
 QUARTER = np.full(3, 0.25)
 ZERO = np.zeros(3)
+MEAN = np.array([0, 0, -0.75])  # of a pyramid
 # By XDMF's code.
 KINDS = {
     6: Solid(SIMPLEX, TETRA_EDGES, TETRA4, 1, FOUR, QUARTER[None], QUARTER),
     38: Solid(SIMPLEX, TETRA_EDGES, TETRA10, 2, _tetra_rule_of_14(), FOUR[0], QUARTER),
     9: Solid(CUBE, HEX_EDGES, BRICK8, 1, brick_rule(2), ZERO[None], ZERO, 3),
     48: Solid(CUBE, HEX_EDGES, BRICK20, 2, brick_rule(3), brick_rule(2)[0], ZERO),
-    8: Solid(PRISM, PRISM_EDGES, WEDGE6, 1, _prism_rule(), THIRD[None], THIRD, 4),
+    50: Solid(CUBE, HEX_EDGES, BRICK27, 2, brick_rule(3), brick_rule(2)[0], ZERO, 0,
+              ((0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (2, 3, 7, 6), (0, 1, 2, 3), (4, 5, 6, 7), tuple(range(8)))),
+    8: Solid(PRISM, WEDGE_EDGES, WEDGE6, 1, _prism_rule(), THIRD[None], THIRD, 4),
+    40: Solid(PRISM, WEDGE_EDGES, WEDGE15, 2, collapsed_prism_rule(3), _prism_rule()[0], THIRD),
+    41: Solid(PRISM, WEDGE_EDGES, WEDGE18, 2, collapsed_prism_rule(3), _prism_rule()[0], THIRD, 0, ((0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))),
+    7: Solid(APEX, PYRAMID_EDGES, PYRAMID5, 1, pyramid_rule(2), MEAN[None], MEAN),
+    39: Solid(APEX, PYRAMID_EDGES, PYRAMID13, 2, pyramid_rule(3), pyramid_rule(2)[0], MEAN),
 }
 
 
 def monomials(x: np.ndarray, exponents: np.ndarray) -> np.ndarray:
-    """x^a y^b z^c at points whose coordinates come last."""
-    powers = np.stack([np.ones_like(x), x, x * x])  # (power, ..., coordinate)
-    return np.stack([powers[a, ..., 0] * powers[b, ..., 1] * powers[c, ..., 2] for a, b, c in exponents], axis=-1)
+    """x^a y^b z^c at points whose coordinates come last; a pole is zero, at the apex of a pyramid."""
+    powers = [np.ones_like(x), x, x * x]
+    if exponents.min() < 0:  # as powers[-1] and so on
+        inverse = np.divide(1, x, out=np.zeros_like(x), where=x != 0)
+        powers += [inverse**3, inverse**2, inverse]
+    return np.stack([powers[a][..., 0] * powers[b][..., 1] * powers[c][..., 2] for a, b, c in exponents], axis=-1)
 
 
 def elasticity(part: dict[str, Any]) -> np.ndarray:

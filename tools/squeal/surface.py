@@ -6,13 +6,17 @@ import numpy as np
 # Faces of each solid, by its corners in the order of the file, which turn round the outward normal.
 HEX = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 WEDGE = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
+PYRAMID = ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
 TETRA = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
 HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 TETRA_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
+WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
+PYRAMID_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))
 # Solids by XDMF's code: number of nodes, faces, edges that have a mid-side node.
-SOLIDS = {9: (8, HEX, ()), 8: (6, WEDGE, ()), 48: (20, HEX, HEX_EDGES), 6: (4, TETRA, ()), 38: (10, TETRA, TETRA_EDGES)}
+SOLIDS = {9: (8, HEX, ()), 48: (20, HEX, HEX_EDGES), 50: (27, HEX, HEX_EDGES), 8: (6, WEDGE, ()), 40: (15, WEDGE, WEDGE_EDGES),
+          41: (18, WEDGE, WEDGE_EDGES), 7: (5, PYRAMID, ()), 39: (13, PYRAMID, PYRAMID_EDGES), 6: (4, TETRA, ()), 38: (10, TETRA, TETRA_EDGES)}
 SHELLS = {5: 4, 4: 3}  # number of nodes
-VTK = {9: 12, 8: 13, 48: 25, 6: 10, 38: 24, 5: 9, 4: 5}  # its number of each kind; the order of nodes is the same
+VTK = {9: 12, 48: 25, 50: 29, 8: 13, 40: 26, 41: 32, 7: 14, 39: 27, 6: 10, 38: 24, 5: 9, 4: 5}  # its number of each kind; the order of nodes is the same
 POINT = 1  # its number of nodes follows
 
 

@@ -6,13 +6,13 @@ from squeal.deck_files import Problem, lines_of, number, whole
 from squeal.mesh_model import FLAT, KINDS, Model, Part
 
 # squeal's kinds by the descriptors of elements; others have no kind
-KIND_OF = {111: "tet4", 118: "tet10", 115: "hex8", 116: "hex20", 112: "wedge6", 41: "tri3", 91: "tri3", 42: "tri6", 92: "tri6",
+KIND_OF = {111: "tet4", 118: "tet10", 115: "hex8", 116: "hex20", 112: "wedge6", 113: "wedge15", 312: "pyramid5", 313: "pyramid13", 41: "tri3", 91: "tri3", 42: "tri6", 92: "tri6",
            44: "quad4", 94: "quad4", 45: "quad8", 95: "quad8"}
 BEAMS = {11, 21, 22, 23, 24}  # lines, which have a line of their own for orientation
-WITHOUT_ELEMENT = {113: "wedges of 15 nodes", 312: "pyramids of 5 nodes", 313: "pyramids of 13 nodes"}
 GROUPS = {"2467", "2477", "2452", "2435"}
 # of parabolic elements the file lists corners and mid-sides in turn around each face
 CORNERS_IN_TURN = {"tri6": [0, 2, 4, 1, 3, 5], "quad8": [0, 2, 4, 6, 1, 3, 5, 7],
+                   "wedge15": [0, 2, 4, 9, 11, 13, 1, 3, 5, 10, 12, 14, 6, 7, 8], "pyramid13": [0, 2, 4, 6, 12, 1, 3, 5, 7, 8, 9, 10, 11],
                    "tet10": [0, 2, 4, 9, 1, 3, 5, 6, 7, 8],
                    "hex20": [0, 2, 4, 6, 12, 14, 16, 18, 1, 3, 5, 7, 13, 15, 17, 19, 8, 9, 10, 11]}
 
@@ -89,8 +89,6 @@ def read_elements(rows, model, left_out):
             i += 1
         if count < 1 or len(nodes) != count:
             raise Problem(f"{place}: {len(nodes)} nodes of element {label}; expected {count}")
-        if kind in WITHOUT_ELEMENT:
-            raise Problem(f"{place}: {WITHOUT_ELEMENT[kind]} have no element in squeal: expected other solids")
         shape = KIND_OF.get(kind)
         if shape is None:
             what = "lines" if kind in BEAMS else f"elements of descriptor {kind}"

@@ -12,7 +12,7 @@
 namespace squeal
 {
 
-/// Shapes of elements and their faces. Nodes are ordered as gmsh numbers them: corners first, then mid-side nodes.
+/// Shapes of elements and their faces. Nodes are ordered as gmsh numbers them: corners, mid-side nodes, middles.
 /// Elements are solids, or shells of 3 and 4 nodes.
 enum class Shape
 {
@@ -22,11 +22,18 @@ enum class Shape
   quad4,
   triangle6,
   quad8,
+  quad9,
   tet4,
   tet10,
+  pyramid5,
+  pyramid13,
+  pyramid14,
   wedge6,
+  wedge15,
+  wedge18,
   hex8,
   hex20,
+  hex27,
 };
 
 /// An element of a part.
@@ -34,14 +41,14 @@ struct Element
 {
   Shape shape{};
   int part = 0;                // index in Scene::parts
-  std::array<int, 20> nodes{}; // indices in Mesh::nodes; the first node_count(shape) are used
+  std::array<int, 27> nodes{}; // indices in Mesh::nodes; the first node_count(shape) are used
 };
 
 /// A face of a named surface. Its nodes are counter-clockwise seen from outside the solid it bounds.
 struct Face
 {
   Shape shape{};
-  std::array<int, 8> nodes{}; // indices in Mesh::nodes; the first node_count(shape) are used
+  std::array<int, 9> nodes{}; // indices in Mesh::nodes; the first node_count(shape) are used
   bool of_shell = false;      // counter-clockwise as the shell's nodes are, which may be seen from either side
 };
 

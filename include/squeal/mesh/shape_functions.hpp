@@ -14,9 +14,10 @@ namespace squeal
 /// Matrix with a number of columns known at run time and bounded by `most`, so that it needs no heap.
 template <int rows, int most> using BoundedMatrix =
     Eigen::Matrix<double, rows, Eigen::Dynamic, Eigen::ColMajor, rows, most>;
-using NodePositions = BoundedMatrix<3, 20>; // [m] one node a column
-using NodeGradients = BoundedMatrix<3, 20>; // derivatives in three directions, one node a column
-using NodeValues = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 20, 1>;
+constexpr int most_nodes = 27;                      // of an element
+using NodePositions = BoundedMatrix<3, most_nodes>; // [m] one node a column
+using NodeGradients = BoundedMatrix<3, most_nodes>; // derivatives in three directions, one node a column
+using NodeValues = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, most_nodes, 1>;
 
 /// Values and derivatives of the shape functions at one point.
 struct ShapeFunctions
@@ -27,6 +28,12 @@ struct ShapeFunctions
 
 /// Natural coordinates of the nodes.
 std::vector<Eigen::Vector3d> natural_positions(Shape shape);
+
+/// Appends the nodes between corners to the corners' places.
+void add_middles(Shape shape, std::vector<Eigen::Vector3d>& corners);
+
+/// Natural coordinates of the mean of the corners.
+Eigen::Vector3d middle_of(Shape shape);
 
 /// Returns the shape functions at the natural coordinates xi. Those of shells and faces depend on xi(0), xi(1) alone.
 ShapeFunctions shape_functions(Shape shape, const Eigen::Vector3d& xi);
@@ -44,6 +51,9 @@ std::vector<Vec3> face_weights(Shape shape, std::span<const Vec3> x);
 /// Returns the shape of a gmsh element type; nothing if squeal does not know it.
 std::optional<Shape> shape_of(int gmsh_type);
 
+/// Returns gmsh's number of the element type.
+int gmsh_type(Shape shape);
+
 /// Number of nodes, number of corners, dimension, and whether an element of this shape is a shell.
 int node_count(Shape shape);
 int corner_count(Shape shape);
@@ -60,13 +70,19 @@ std::vector<Vec3> positions_of(const Mesh& mesh, std::span<const int> nodes);
 /// Returns the two end nodes of the side of each mid-side node, in the order of the mid-side nodes.
 std::span<const std::array<int, 2>> mid_sides(Shape shape);
 
+/// Returns the corners that each further node is in the middle of: 2 of a side, 4 of a face, 8 of a box.
+const std::vector<std::vector<int>>& middles_of(Shape shape);
+
 /// Returns the corners of each face of a solid, counter-clockwise seen from outside. A triangle has -1 as its fourth.
 std::span<const std::array<int, 4>> corner_faces(Shape shape);
 
 /// Returns the corner nodes of each face of a solid, counter-clockwise seen from outside.
 std::vector<std::vector<int>> faces_of(const Element& element);
 
-/// Returns the node order of the mirrored element or face: entry i is the old number of the new node i.
+/// Returns the face of an element with these corner nodes, in their order, and with the element's nodes between them.
+Face face_on(const Element& element, std::span<const int> corners);
+
+/// Returns the node order of the mirrored element: entry i is the old number of the new node i.
 /// An element numbered inside out has a positive Jacobian in this order.
 std::vector<int> mirrored_order(Shape shape);
 

@@ -3,7 +3,7 @@
 ///
 /// hex8, wedge6: incompatible modes in Taylor's corrected form. Both pass the patch test on any shape; hex8 does not
 ///     lock in bending, wedge6 does and is for filling.
-/// hex20, tet10, tet4: isoparametric, with full integration. tet4 locks in bending.
+/// Others: isoparametric, with full integration. tet4 and pyramid5 lock in bending.
 /// shell4, shell3: flat with transverse shear (DKMQ, DKMT) and drilling rotations, six degrees of freedom a node.
 ///     Warped quadrilaterals have rigid links from the nodes to their plane.
 /// Sources and caveats stand at each kernel. The mass follows from the same motion as the stiffness: it includes the
