@@ -64,46 +64,25 @@ public:
   {
     set_parameter(problem.settings.own);
     at_->map.reactions = problem.own.sliding.equilibrium.reactions;
-  }
-
-  /// Borrows the object.
-  FlowFamily flows()
-  {
-    FlowFamily family;
-    family.flow.M = problem_.own.sliding.structure.M;
-    family.flow.K = problem_.own.sliding.structure.K;
-    family.flow.work = at_->flow.work;
-    family.flow.integrate = [this](double period, Vec start, Vec end, Vec rate)
-    { at_->flow.integrate(period, start, end, rate); };
-    family.flow.record_period = [this](double period, Vec start, const TimeGrid& grid)
-    { at_->flow.record_period(period, start, grid); };
-    family.flow.apply_tangent = [this](std::span<const Vec> states) { at_->flow.apply_tangent(states); };
-    family.flow.slow_motions = [this](double period, Vec start)
-    {
-      (void)equilibrium();
-      return at_->flow.slow_motions(period, start);
-    };
-    if (at_->flow.offsets.motion)
-    {
-      family.flow.offsets.motion = [this] { return at_->flow.offsets.motion(); };
-      family.flow.offsets.find_rest = [this](Vec rest) { at_->flow.offsets.find_rest(rest); };
-      family.flow.offsets.without_held = [this](Vec part) { at_->flow.offsets.without_held(part); };
-    }
-    family.set_parameter = [this](double parameter) { set_parameter(parameter); };
-    family.rest = [this] { return rest(); };
-    family.parameter_column = [this](double period, Vec start, Vec column) { parameter_column(period, start, column); };
-    family.measure = [this](const Orbit& orbit) { return measure(orbit); };
-    if (whole_tangent_is_cheap(2. * dofs_of(problem_.cycle.orbit.state))) return family;
-    family.preconditioner = [this](double period, Vec x, Vec y) { apply(inverse_, period, x, y); };
-    family.renew_preconditioner = [this]
+    family_.set_parameter = [this](double parameter) { set_parameter(parameter); };
+    family_.rest = [this] { return rest(); };
+    family_.parameter_column = [this](double period, Vec start, Vec column)
+    { parameter_column(period, start, column); };
+    family_.measure = [this](const Orbit& orbit) { return measure(orbit); };
+    if (whole_tangent_is_cheap(2. * dofs_of(problem_.cycle.orbit.state))) return;
+    family_.preconditioner = [this](double period, Vec x, Vec y) { apply(inverse_, period, x, y); };
+    family_.renew_preconditioner = [this]
     {
       (void)equilibrium();
       at_->problem.reduced = nullptr;
       inverse_ = [at = at_, by_record = recorded_preconditioner(at_->problem, at_->map)](double period, Vec x, Vec y)
       { by_record(period, x, y); };
     };
-    return family;
   }
+  BrakeFamily(const BrakeFamily&) = delete;
+  BrakeFamily& operator=(const BrakeFamily&) = delete;
+
+  const FlowFamily& flows() const { return family_; }
 
 private:
   void set_parameter(double parameter)
@@ -121,6 +100,14 @@ private:
     auto next = std::make_shared<BrakeAt>(parameter, problem_.model_at(parameter), problem_);
     if (at_) next->map.reactions = at_->map.reactions;
     at_ = std::move(next);
+    Flow& flow = family_.flow = at_->flow;
+    flow.M = problem_.own.sliding.structure.M;
+    flow.K = problem_.own.sliding.structure.K;
+    flow.slow_motions = [this](double period, Vec start)
+    {
+      (void)equilibrium();
+      return at_->flow.slow_motions(period, start);
+    };
   }
 
   /// Of the value set last.
@@ -178,7 +165,8 @@ private:
   }
 
   const BrakeBranchProblem& problem_;
-  bool friction_; // the parameter is the friction coefficient
+  FlowFamily family_{}; // its flow is that of the value set last
+  bool friction_;       // the parameter is the friction coefficient
   std::shared_ptr<BrakeAt> at_{};
   Preconditioner inverse_{}; // of the period at which the Jacobian was formed last; holds its brake
 };
@@ -199,9 +187,9 @@ Outcome outcome_of(const BrakeBranchProblem& problem, const Branch& branch)
                             problem.tolerance, problem.steps_per_period);
     return outcome;
   }
-  for (const BranchPoint& point : branch.points) outcome.residual = std::max(outcome.residual, point.residual);
+  for (const BranchPoint& point : branch.points) outcome.residual = std::max(outcome.residual, point.orbit.residual);
   const auto beside_jumps = std::ranges::count_if(branch.points, [&](const BranchPoint& point)
-                                                  { return point.residual > problem.tolerance; });
+                                                  { return point.orbit.residual > problem.tolerance; });
   if (beside_jumps > 0)
     outcome.reason =
         format("at %ld of %zu points the period's map jumps, where contact changes in a step: residuals up "
@@ -243,14 +231,11 @@ BrakeBranch find_branch(const BrakeBranchProblem& problem)
   const BranchSettings& settings = problem.settings;
   const ContinuationSettings continuation{std::min(settings.from, settings.to), std::max(settings.from, settings.to),
                                           settings.points, problem.tolerance, problem.steps_per_period};
-  BrakeFamily family(problem);
+  const BrakeFamily family(problem);
   BrakeBranch found;
-  found.equilibria = problem.stability.equilibria;
   found.branch =
       trace_branch(family.flows(), continuation, problem.shooting, problem.cycle.orbit, problem.settings.own);
   found.outcome = outcome_of(problem, found.branch);
-  const std::vector<BranchEvent>& hopf = problem.stability.hopf;
-  found.branch.events.insert(found.branch.events.begin(), hopf.begin(), hopf.end());
   return found;
 }
 

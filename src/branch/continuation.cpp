@@ -16,22 +16,21 @@ namespace
 /// One side of a branch, from its start on.
 struct BranchSide
 {
-  std::vector<ExaminedOrbit> orbits; // the start first
+  std::vector<BranchPoint> orbits; // the start first
   std::vector<BranchEvent> events;
   std::array<KnownBeyond, 2> known; // multipliers
   BranchEnding ending = BranchEnding::number_of_points;
 };
 
 /// Measures changes about an orbit, and the distances of states from the rest of its parameter.
-void refer_to(BranchCorrector& corrector, CorrectedOrbit& corrected)
+void refer_to(BranchCorrector& corrector, BranchPoint& point)
 {
-  corrector.family.set_parameter(corrected.parameter);
+  corrector.family.set_parameter(point.parameter);
   corrector.rest = corrector.family.rest();
-  corrector.period = corrected.orbit.period;
-  corrected.orbit.fluctuation =
-      energy_norm(corrector.family.flow, fluctuation_of(problem_of(corrector), corrected.orbit));
-  corrector.scales.fluctuation = corrected.orbit.fluctuation;
-  corrector.scales.period = corrected.orbit.period;
+  corrector.period = point.orbit.period;
+  point.orbit.fluctuation = energy_norm(corrector.family.flow, fluctuation_of(problem_of(corrector), point.orbit));
+  corrector.scales.fluctuation = point.orbit.fluctuation;
+  corrector.scales.period = point.orbit.period;
 }
 
 /// Steps along a branch.
@@ -62,8 +61,7 @@ void remove_shift(const BranchCorrector& corrector, const Orbit& orbit, Bordered
 }
 
 /// The orbit a step on, on the bound where the step would pass it; none if it was not found.
-std::optional<CorrectedOrbit> step_on(BranchCorrector& corrector, const CorrectedOrbit& from, const Walk& walk,
-                                      double length)
+std::optional<BranchPoint> step_on(BranchCorrector& corrector, const BranchPoint& from, const Walk& walk, double length)
 {
   const ContinuationSettings& settings = corrector.settings;
   BorderedVector predicted = vector_of(from);
@@ -75,7 +73,7 @@ std::optional<CorrectedOrbit> step_on(BranchCorrector& corrector, const Correcte
     predicted.parameter = bound;
     return correct(corrector, predicted, {zeros_like(predicted.state), 0, corrector.scales.parameter});
   }
-  std::optional<CorrectedOrbit> next = correct(corrector, predicted, walk.tangent);
+  std::optional<BranchPoint> next = correct(corrector, predicted, walk.tangent);
   if (!next) return next;
   BorderedVector error = vector_of(*next);
   add(-1, predicted, error);
@@ -87,7 +85,7 @@ std::optional<CorrectedOrbit> step_on(BranchCorrector& corrector, const Correcte
 }
 
 /// The direction from one orbit to the next, of scaled length 1 about the next.
-BorderedVector direction_between(const BranchCorrector& corrector, const CorrectedOrbit& from, const CorrectedOrbit& to)
+BorderedVector direction_between(const BranchCorrector& corrector, const BranchPoint& from, const BranchPoint& to)
 {
   BorderedVector direction = vector_of(to);
   add(-1, vector_of(from), direction);
@@ -97,9 +95,9 @@ BorderedVector direction_between(const BranchCorrector& corrector, const Correct
 }
 
 /// What does not depend on the phase at which an orbit begins: parameter over its range, ln T, ln E.
-Eigen::Vector3d without_phase(const BranchCorrector& corrector, const ExaminedOrbit& orbit)
+Eigen::Vector3d without_phase(const BranchCorrector& corrector, const BranchPoint& orbit)
 {
-  return {orbit.corrected.parameter / corrector.scales.parameter, std::log(orbit.corrected.orbit.period),
+  return {orbit.parameter / corrector.scales.parameter, std::log(orbit.orbit.period),
           std::log(orbit.measures.mean_fluctuating_energy)};
 }
 
@@ -144,23 +142,20 @@ bool is_nonlinear(const PointMeasures& measures)
 std::optional<BranchEnding> natural_end(const ContinuationSettings& settings, const BranchSide& side)
 {
   constexpr double small = 0.02; // of the start's fluctuation: the parameter is then within 4e-4 of its change to Hopf
-  const ExaminedOrbit &last = side.orbits.back(), &before = side.orbits[side.orbits.size() - 2];
-  if (last.corrected.parameter == settings.least || last.corrected.parameter == settings.greatest)
-    return BranchEnding::bound;
+  const BranchPoint &last = side.orbits.back(), &before = side.orbits[side.orbits.size() - 2];
+  if (last.parameter == settings.least || last.parameter == settings.greatest) return BranchEnding::bound;
   if (is_nonlinear(before.measures) && !is_nonlinear(last.measures)) return BranchEnding::linear_motion;
-  if (last.corrected.orbit.fluctuation < small * side.orbits.front().corrected.orbit.fluctuation)
-    return BranchEnding::small_amplitude;
+  if (last.orbit.fluctuation < small * side.orbits.front().orbit.fluctuation) return BranchEnding::small_amplitude;
   return {};
 }
 
 /// Where the branch meets its equilibrium: the parameter is linear in the square of a small amplitude.
-BranchEvent hopf_beyond(const ExaminedOrbit& before, const ExaminedOrbit& last)
+BranchEvent hopf_beyond(const BranchPoint& before, const BranchPoint& last)
 {
-  const double p1 = before.corrected.parameter, p2 = last.corrected.parameter;
-  const double square1 = std::pow(before.corrected.orbit.fluctuation, 2),
-               square2 = std::pow(last.corrected.orbit.fluctuation, 2);
+  const double p1 = before.parameter, p2 = last.parameter;
+  const double square1 = std::pow(before.orbit.fluctuation, 2), square2 = std::pow(last.orbit.fluctuation, 2);
   const double further = (p2 - p1) * square2 / (square1 - square2);
-  return {BranchEventKind::hopf, p2 + further, std::abs(further), last.corrected.orbit.period, 0, 0};
+  return {BranchEventKind::hopf, p2 + further, std::abs(further), last.orbit.period, 0, 0};
 }
 
 void end_at_hopf(BranchSide& side)
@@ -175,28 +170,23 @@ bool shrinks_to_a_point(const BranchSide& side)
 {
   constexpr double small = 0.1;
   if (side.orbits.size() < 2) return false;
-  const double last = side.orbits.back().corrected.orbit.fluctuation;
-  return last < side.orbits[side.orbits.size() - 2].corrected.orbit.fluctuation &&
-         last < small * side.orbits.front().corrected.orbit.fluctuation;
-}
-
-ExaminedOrbit copied(const ExaminedOrbit& orbit)
-{
-  return {{squeal::copy_of(orbit.corrected.orbit), orbit.corrected.parameter, 0}, orbit.multipliers, orbit.measures};
+  const double last = side.orbits.back().orbit.fluctuation;
+  return last < side.orbits[side.orbits.size() - 2].orbit.fluctuation &&
+         last < small * side.orbits.front().orbit.fluctuation;
 }
 
 /// The part of the range that the branch has passed, of which the way down comes first.
 double range_passed(const BranchCorrector& corrector, const BranchSide& side, bool upwards)
 {
-  const double start = side.orbits.front().corrected.parameter;
+  const double start = side.orbits.front().parameter;
   double passed = 0; // folds lead back
-  for (const ExaminedOrbit& orbit : side.orbits) passed = std::max(passed, std::abs(orbit.corrected.parameter - start));
+  for (const BranchPoint& orbit : side.orbits) passed = std::max(passed, std::abs(orbit.parameter - start));
   return upwards ? start - corrector.settings.least + passed : passed;
 }
 
 /// The orbit round a corner. Where contact begins or ends to do something the branch may turn at once: what closes
 /// beyond has its tangent by the contact there, and the parameter goes back.
-std::optional<CorrectedOrbit> step_round_corner(BranchCorrector& corrector, const CorrectedOrbit& from, Walk& walk)
+std::optional<BranchPoint> step_round_corner(BranchCorrector& corrector, const BranchPoint& from, Walk& walk)
 {
   constexpr double longer = 5;
   for (double length = longer * walk.least; length < walk.greatest; length *= longer)
@@ -215,14 +205,14 @@ std::optional<CorrectedOrbit> step_round_corner(BranchCorrector& corrector, cons
 }
 
 /// The next orbit, by shorter and shorter steps, then round a corner; none: no orbit closes near the last one.
-std::optional<CorrectedOrbit> next_orbit(BranchCorrector& corrector, const CorrectedOrbit& from, Walk& walk)
+std::optional<BranchPoint> next_orbit(BranchCorrector& corrector, const BranchPoint& from, Walk& walk)
 {
   while (walk.length >= walk.least)
   {
     const double length = limited(corrector, walk);
     if (auto next = step_on(corrector, from, walk, length))
     {
-      const double times = next->iterations <= 4 ? 1.5 : next->iterations > 7 ? 0.7 : 1;
+      const double times = next->corrections <= 4 ? 1.5 : next->corrections > 7 ? 0.7 : 1;
       walk.length = std::clamp(length * times, walk.least, walk.greatest);
       return next;
     }
@@ -234,18 +224,18 @@ std::optional<CorrectedOrbit> next_orbit(BranchCorrector& corrector, const Corre
 }
 
 /// Follows the branch from its start in the direction of the tangent.
-BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, BorderedVector tangent)
+BranchSide follow(BranchCorrector& corrector, const BranchPoint& start, BorderedVector tangent)
 {
   const int points = corrector.settings.points;
   BranchSide side{{}, {}, known_beyond(start.multipliers)};
-  side.orbits.push_back(copied(start));
-  refer_to(corrector, side.orbits.back().corrected);
+  side.orbits.push_back({squeal::copy_of(start.orbit), start.parameter, 0, start.multipliers, start.measures});
+  refer_to(corrector, side.orbits.back());
   // The smallest step must resolve a change of contact also where the range is far wider than the value at the start.
-  const double of_range = std::clamp(std::abs(start.corrected.parameter) / corrector.scales.parameter, 1e-3, 1.);
+  const double of_range = std::clamp(std::abs(start.parameter) / corrector.scales.parameter, 1e-3, 1.);
   Walk walk{std::move(tangent), 1. / points, 2e-3 / points * of_range, 6. / points};
   const bool upwards = walk.tangent.parameter > 0;
   if (!inside(corrector.settings,
-              start.corrected.parameter + std::copysign(1e-9 * corrector.scales.parameter, walk.tangent.parameter)))
+              start.parameter + std::copysign(1e-9 * corrector.scales.parameter, walk.tangent.parameter)))
   {
     side.ending = BranchEnding::not_followed;
     return side;
@@ -253,13 +243,14 @@ BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, Border
   while (static_cast<int>(side.orbits.size()) <= 8 * points)
   {
     corrector.log.done = range_passed(corrector, side, upwards);
-    std::optional<CorrectedOrbit> next = next_orbit(corrector, side.orbits.back().corrected, walk);
+    std::optional<BranchPoint> next = next_orbit(corrector, side.orbits.back(), walk);
     bool goes_on = next.has_value();
     if (goes_on)
     {
       refer_to(corrector, *next);
-      walk.tangent = direction_between(corrector, side.orbits.back().corrected, *next);
-      side.orbits.push_back(examine(corrector, std::move(*next), Examined::multipliers_too));
+      walk.tangent = direction_between(corrector, side.orbits.back(), *next);
+      examine(corrector, *next, Examined::multipliers_too);
+      side.orbits.push_back(std::move(*next));
       goes_on = !went_back(corrector, side);
       if (!goes_on) side.orbits.pop_back();
     }
@@ -280,46 +271,17 @@ BranchSide follow(BranchCorrector& corrector, const ExaminedOrbit& start, Border
   return side;
 }
 
-BranchPoint point_of(ExaminedOrbit& examined)
-{
-  Orbit& orbit = examined.corrected.orbit;
-  return {examined.corrected.parameter,    std::move(orbit.state),      orbit.period, orbit.residual, orbit.fluctuation,
-          std::move(examined.multipliers), std::move(examined.measures)};
-}
-
 /// The backward side turned round, the start, the forward side.
 Branch joined(BranchSide backward, BranchSide forward)
 {
   Branch branch;
   branch.ends = {backward.ending, forward.ending};
-  for (std::size_t i = backward.orbits.size(); i-- > 1;) branch.points.push_back(point_of(backward.orbits[i]));
-  for (ExaminedOrbit& orbit : forward.orbits) branch.points.push_back(point_of(orbit));
+  for (std::size_t i = backward.orbits.size(); i-- > 1;) branch.points.push_back(std::move(backward.orbits[i]));
+  std::ranges::move(forward.orbits, std::back_inserter(branch.points));
   std::reverse(backward.events.begin(), backward.events.end());
   for (BranchEvent& event : backward.events) event.change = -event.change;
   branch.events = std::move(backward.events);
   branch.events.insert(branch.events.end(), forward.events.begin(), forward.events.end());
-  return branch;
-}
-
-BorderedVector rising_parameter(const BranchCorrector& corrector, const Orbit& start)
-{
-  return {zeros_like(start.state), 0, corrector.scales.parameter};
-}
-
-/// The orbit of this value near the start.
-std::optional<CorrectedOrbit> correct_start(BranchCorrector& corrector, const Orbit& start, double parameter)
-{
-  CorrectedOrbit first{squeal::copy_of(start), parameter, 0};
-  refer_to(corrector, first);
-  return correct(corrector, vector_of(first), rising_parameter(corrector, start));
-}
-
-/// A branch that could not begin.
-Branch without_start(long periods)
-{
-  Branch branch;
-  branch.ends = {BranchEnding::step_too_small, BranchEnding::step_too_small};
-  branch.periods = periods;
   return branch;
 }
 
@@ -349,16 +311,18 @@ Branch trace_branch(const FlowFamily& family, const ContinuationSettings& settin
   ConvergenceLog log{progress, {}, 0.};
   BranchCorrector corrector{family, settings, options, log};
   corrector.scales.parameter = settings.greatest - settings.least;
-  const BorderedVector rising = rising_parameter(corrector, start);
-  std::optional<CorrectedOrbit> closed = correct_start(corrector, start, parameter);
-  if (!closed) return without_start(log.convergence.periods);
-  refer_to(corrector, *closed);
-  ExaminedOrbit examined = examine(corrector, std::move(*closed), Examined::multipliers_too);
-  BorderedVector tangent = tangent_at(corrector, examined.corrected, rising), back = copy_of(tangent);
+  const BorderedVector rising{zeros_like(start.state), 0, corrector.scales.parameter};
+  BranchPoint given{squeal::copy_of(start), parameter, 0};
+  refer_to(corrector, given);
+  std::optional<BranchPoint> first = correct(corrector, vector_of(given), rising);
+  if (!first) return {{}, {}, {BranchEnding::step_too_small, BranchEnding::step_too_small}, log.convergence.periods};
+  refer_to(corrector, *first);
+  examine(corrector, *first, Examined::multipliers_too);
+  BorderedVector tangent = tangent_at(corrector, *first, rising), back = copy_of(tangent);
   scale(-1, back);
-  BranchSide backward = follow(corrector, examined, std::move(back));
+  BranchSide backward = follow(corrector, *first, std::move(back));
   corrector.secants.clear();
-  BranchSide forward = follow(corrector, examined, std::move(tangent));
+  BranchSide forward = follow(corrector, *first, std::move(tangent));
   Branch branch = joined(std::move(backward), std::move(forward));
   drop_folds_of_residuals(settings, branch.events);
   branch.periods = log.convergence.periods;

@@ -69,13 +69,13 @@ OrbitProblem problem_of(const BranchCorrector& corrector)
           corrector.period,      corrector.settings.tolerance,    0};
 }
 
-BorderedVector vector_of(const CorrectedOrbit& corrected)
+BorderedVector vector_of(const BranchPoint& point)
 {
-  return {copy_of(corrected.orbit.state.get()), corrected.orbit.period, corrected.parameter};
+  return {copy_of(point.orbit.state.get()), point.orbit.period, point.parameter};
 }
 
-std::optional<CorrectedOrbit> correct(BranchCorrector& corrector, const BorderedVector& predicted,
-                                      const BorderedVector& normal)
+std::optional<BranchPoint> correct(BranchCorrector& corrector, const BorderedVector& predicted,
+                                   const BorderedVector& normal)
 {
   const OrbitProblem problem = problem_of(corrector);
   const auto evaluate_at = [&](const BorderedVector& z)
@@ -89,14 +89,13 @@ std::optional<CorrectedOrbit> correct(BranchCorrector& corrector, const Bordered
   bool renew = corrector.secants.empty();
   int since_progress = 0, moves = 0, corrections = 0;
   double least = std::numeric_limits<double>::infinity();
-  std::optional<CorrectedOrbit> best;
+  std::optional<BranchPoint> best;
   for (int iteration = 0; iteration <= most_iterations; ++iteration)
   {
     if (!makes_progress(corrector, orbit, first_residual)) break;
     record_full(corrector.log, ShootingStage::multisecant, orbit);
-    if (orbit.residual <= problem.tolerance) return CorrectedOrbit{std::move(orbit), z.parameter, corrections};
-    if (!(best && best->orbit.residual <= orbit.residual))
-      best = CorrectedOrbit{copy_of(orbit), z.parameter, corrections};
+    if (orbit.residual <= problem.tolerance) return BranchPoint{std::move(orbit), z.parameter, corrections};
+    if (!(best && best->orbit.residual <= orbit.residual)) best = BranchPoint{copy_of(orbit), z.parameter, corrections};
     since_progress = orbit.residual < progress * least ? 0 : since_progress + 1;
     least = std::min(least, orbit.residual);
     if (since_progress == steps_without_progress && corrector.settings.steps > 0)
@@ -136,10 +135,10 @@ std::optional<CorrectedOrbit> correct(BranchCorrector& corrector, const Bordered
   return {};
 }
 
-BorderedVector tangent_at(BranchCorrector& corrector, const CorrectedOrbit& corrected, const BorderedVector& about)
+BorderedVector tangent_at(BranchCorrector& corrector, const BranchPoint& point, const BorderedVector& about)
 {
-  const Orbit& orbit = corrected.orbit;
-  corrector.family.set_parameter(corrected.parameter);
+  const Orbit& orbit = point.orbit;
+  corrector.family.set_parameter(point.parameter);
   form_jacobian(corrector, orbit);
   const OrbitProblem problem = problem_of(corrector);
   const BorderedSystem system = system_at(problem, corrector.scales, orbit, corrector.parameter_column, about);
@@ -154,7 +153,7 @@ namespace
 {
 
 /// What is counted on an orbit. A change of a count is an event.
-using Count = std::function<int(const ExaminedOrbit&)>;
+using Count = std::function<int(const BranchPoint&)>;
 
 /// How the event of a count is looked for.
 struct Search
@@ -172,37 +171,24 @@ bool is_of(BranchEventKind kind, std::complex<double> multiplier)
   return kind == BranchEventKind::period_doubling && multiplier.imag() == 0 && multiplier.real() < 0;
 }
 
-/// The number of multipliers of the event beyond the unit circle, by their values.
-int beyond(BranchEventKind kind, const Multipliers& multipliers)
+/// The values that count as the moduli of multipliers.
+enum class Moduli
 {
-  return static_cast<int>(std::count_if(multipliers.values.begin(), multipliers.values.end(),
-                                        [kind](std::complex<double> value)
-                                        { return is_of(kind, value) && std::abs(value) > 1; }));
-}
-
-/// The least and the greatest number of them that the bars allow.
-struct CountRange
-{
-  int least = 0, most = 0;
+  least, // that the bars allow
+  found,
+  greatest,
 };
 
-CountRange range_beyond(BranchEventKind kind, const Multipliers& multipliers)
+/// The number of multipliers beyond the unit circle: of the event, or of all.
+int beyond(std::optional<BranchEventKind> kind, const Multipliers& multipliers, Moduli moduli)
 {
-  CountRange range;
+  int count = 0;
   for (std::size_t i = 0; i < multipliers.values.size(); ++i)
   {
-    if (!is_of(kind, multipliers.values[i])) continue;
-    const double size = std::abs(multipliers.values[i]), bar = multipliers.errors[i];
-    range.least += size - bar > 1;
-    range.most += size + bar > 1;
+    const double bar = moduli == Moduli::found ? 0 : multipliers.errors[i], size = std::abs(multipliers.values[i]);
+    if (!kind || is_of(*kind, multipliers.values[i])) count += (moduli == Moduli::least ? size - bar : size + bar) > 1;
   }
-  return range;
-}
-
-int all_beyond(const Multipliers& multipliers)
-{
-  return static_cast<int>(std::count_if(multipliers.values.begin(), multipliers.values.end(),
-                                        [](std::complex<double> value) { return std::abs(value) > 1; }));
+  return count;
 }
 
 /// The modulus of the event's multiplier of that place, the largest first, and its bar; none: there are not as many.
@@ -223,20 +209,19 @@ BorderedVector between(const BorderedVector& from, const BorderedVector& to, dou
   return z;
 }
 
-std::optional<CorrectedOrbit> correct_between(BranchCorrector& corrector, const ExaminedOrbit& from,
-                                              const ExaminedOrbit& to, double part)
+std::optional<BranchPoint> correct_between(BranchCorrector& corrector, const BranchPoint& from, const BranchPoint& to,
+                                           double part)
 {
-  const BorderedVector a = vector_of(from.corrected), b = vector_of(to.corrected);
+  const BorderedVector a = vector_of(from), b = vector_of(to);
   BorderedVector normal = copy_of(b);
   add(-1, a, normal);
   scale(1 / std::sqrt(scaled_product(corrector, normal, normal)), normal);
   return correct(corrector, between(a, b, part), normal);
 }
 
-BranchEvent event_at(BranchEventKind kind, const ExaminedOrbit& orbit, double error)
+BranchEvent event_at(BranchEventKind kind, const BranchPoint& orbit, double error)
 {
-  return {kind, orbit.corrected.parameter, error, orbit.corrected.orbit.period, orbit.measures.mean_fluctuating_energy,
-          0};
+  return {kind, orbit.parameter, error, orbit.orbit.period, orbit.measures.mean_fluctuating_energy, 0};
 }
 
 /// An event, and the multipliers at the ends of the interval that is left.
@@ -248,26 +233,25 @@ struct LocatedEvent
 
 /// Halves the interval between two orbits of different counts. The event is put to the end of higher energy of what is
 /// left: there the orbit has what the event is about.
-LocatedEvent locate(BranchCorrector& corrector, const Search& search, const ExaminedOrbit& from,
-                    const ExaminedOrbit& to)
+LocatedEvent locate(BranchCorrector& corrector, const Search& search, const BranchPoint& from, const BranchPoint& to)
 {
   const int first = search.count(from);
   double low = 0, high = 1;
-  double low_parameter = from.corrected.parameter, high_parameter = to.corrected.parameter;
-  double period = to.corrected.orbit.period, energy = to.measures.mean_fluctuating_energy;
+  double low_parameter = from.parameter, high_parameter = to.parameter;
+  double period = to.orbit.period, energy = to.measures.mean_fluctuating_energy;
   Multipliers before = from.multipliers, after = to.multipliers;
   for (int i = 0; i < search.halvings; ++i)
   {
     const double middle = 0.5 * (low + high);
-    std::optional<CorrectedOrbit> corrected = correct_between(corrector, from, to, middle);
-    if (!corrected) break;
-    ExaminedOrbit orbit = examine(corrector, std::move(*corrected), search.examined);
-    const bool is_before = search.count(orbit) == first;
+    std::optional<BranchPoint> point = correct_between(corrector, from, to, middle);
+    if (!point) break;
+    examine(corrector, *point, search.examined);
+    const bool is_before = search.count(*point) == first;
     (is_before ? low : high) = middle;
-    (is_before ? low_parameter : high_parameter) = orbit.corrected.parameter;
-    (is_before ? before : after) = std::move(orbit.multipliers);
-    period = orbit.corrected.orbit.period;
-    energy = orbit.measures.mean_fluctuating_energy;
+    (is_before ? low_parameter : high_parameter) = point->parameter;
+    (is_before ? before : after) = std::move(point->multipliers);
+    period = point->orbit.period;
+    energy = point->measures.mean_fluctuating_energy;
   }
   return {{search.kind, 0.5 * (low_parameter + high_parameter), 0.5 * std::abs(high_parameter - low_parameter), period,
            energy, search.count(to) - first},
@@ -280,11 +264,11 @@ bool moves(const PointMeasures& measures)
   return measures.open_steps > 0;
 }
 
-std::vector<Search> searches(const ExaminedOrbit& from, const ExaminedOrbit& to)
+std::vector<Search> searches(const BranchPoint& from, const BranchPoint& to)
 {
-  const auto lifts = [](const ExaminedOrbit& orbit) { return moves(orbit.measures) ? 1 : 0; };
-  const auto sticks = [](const ExaminedOrbit& orbit) { return orbit.measures.stick_steps > 0 ? 1 : 0; };
-  const auto opens = [](const ExaminedOrbit& orbit) { return orbit.measures.lift_offs; };
+  const auto lifts = [](const BranchPoint& orbit) { return moves(orbit.measures) ? 1 : 0; };
+  const auto sticks = [](const BranchPoint& orbit) { return orbit.measures.stick_steps > 0 ? 1 : 0; };
+  const auto opens = [](const BranchPoint& orbit) { return orbit.measures.lift_offs; };
   std::vector<Search> found = {
       {BranchEventKind::first_lift_off, lifts, Examined::measures_alone, 7},
       {BranchEventKind::first_stick, sticks, Examined::measures_alone, 5},
@@ -304,45 +288,42 @@ double vertex(const std::array<double, 3>& s, const std::array<double, 3>& p)
   return 0.5 * (s[0] + s[1]) - first / (2 * bend);
 }
 
-double distance(const BranchCorrector& corrector, const ExaminedOrbit& from, const ExaminedOrbit& to)
+double distance(const BranchCorrector& corrector, const BranchPoint& from, const BranchPoint& to)
 {
-  BorderedVector step = vector_of(to.corrected);
-  add(-1, vector_of(from.corrected), step);
+  BorderedVector step = vector_of(to);
+  add(-1, vector_of(from), step);
   return std::sqrt(scaled_product(corrector, step, step));
 }
 
 /// Whether contact does the same on both orbits, so that a parabola may hold between them.
-bool alike(const ExaminedOrbit& a, const ExaminedOrbit& b)
+bool alike(const BranchPoint& a, const BranchPoint& b)
 {
   return moves(a.measures) == moves(b.measures) && (a.measures.stick_steps > 0) == (b.measures.stick_steps > 0);
 }
 
 /// How far beyond the middle one of three orbits the parameter may turn, where either side bends towards its turn: the
 /// line of each side goes on to the other one's end.
-double rise_to_corner(const BranchCorrector& corrector, const std::array<const ExaminedOrbit*, 3>& orbits)
+double rise_to_corner(const BranchCorrector& corrector, const std::array<const BranchPoint*, 3>& orbits)
 {
   const double before = distance(corrector, *orbits[0], *orbits[1]),
                after = distance(corrector, *orbits[1], *orbits[2]);
-  const double of_first = std::abs(orbits[1]->corrected.parameter - orbits[0]->corrected.parameter),
-               of_second = std::abs(orbits[2]->corrected.parameter - orbits[1]->corrected.parameter);
+  const double of_first = std::abs(orbits[1]->parameter - orbits[0]->parameter),
+               of_second = std::abs(orbits[2]->parameter - orbits[1]->parameter);
   return std::max(of_first / before * after, of_second / after * before);
 }
 
 } // namespace
 
-ExaminedOrbit examine(BranchCorrector& corrector, CorrectedOrbit corrected, Examined wanted)
+void examine(BranchCorrector& corrector, BranchPoint& point, Examined wanted)
 {
-  ExaminedOrbit examined{std::move(corrected), {}, {}};
-  const Orbit& orbit = examined.corrected.orbit;
-  corrector.family.set_parameter(examined.corrected.parameter);
-  if (corrector.family.measure) examined.measures = corrector.family.measure(orbit);
-  if (wanted == Examined::measures_alone) return examined;
-  examined.multipliers = find_multipliers(problem_of(corrector), corrector.options, orbit).multipliers;
-  corrector.columns += examined.multipliers.periods;
-  return examined;
+  corrector.family.set_parameter(point.parameter);
+  if (corrector.family.measure) point.measures = corrector.family.measure(point.orbit);
+  if (wanted == Examined::measures_alone) return;
+  point.multipliers = find_multipliers(problem_of(corrector), corrector.options, point.orbit).multipliers;
+  corrector.columns += point.multipliers.periods;
 }
 
-std::vector<BranchEvent> events_between(BranchCorrector& corrector, const ExaminedOrbit& from, const ExaminedOrbit& to)
+std::vector<BranchEvent> events_between(BranchCorrector& corrector, const BranchPoint& from, const BranchPoint& to)
 {
   std::vector<BranchEvent> events;
   for (const Search& search : searches(from, to)) events.push_back(locate(corrector, search, from, to).event);
@@ -352,64 +333,66 @@ std::vector<BranchEvent> events_between(BranchCorrector& corrector, const Examin
 std::array<KnownBeyond, 2> known_beyond(const Multipliers& start)
 {
   std::array<KnownBeyond, 2> known = {{{BranchEventKind::neimark_sacker}, {BranchEventKind::period_doubling}}};
-  for (KnownBeyond& one : known) one.count = beyond(one.kind, start);
+  for (KnownBeyond& one : known) one.count = beyond(one.kind, start, Moduli::found);
   return known;
 }
 
-std::optional<BranchEvent> crossing_among(BranchCorrector& corrector, const std::vector<ExaminedOrbit>& orbits,
+std::optional<BranchEvent> crossing_among(BranchCorrector& corrector, const std::vector<BranchPoint>& orbits,
                                           KnownBeyond& known)
 {
   const BranchEventKind kind = known.kind;
   const std::size_t last = orbits.size() - 1;
-  const CountRange range = range_beyond(kind, orbits[last].multipliers);
-  if (range.least <= known.count && known.count <= range.most)
+  const int least = beyond(kind, orbits[last].multipliers, Moduli::least),
+            most = beyond(kind, orbits[last].multipliers, Moduli::greatest);
+  if (least <= known.count && known.count <= most)
   {
-    if (range.least == range.most) known.place = last;
+    if (least == most) known.place = last;
     return {};
   }
+  const Count count = [kind](const BranchPoint& orbit) { return beyond(kind, orbit.multipliers, Moduli::found); };
   std::size_t before = last - 1; // the last of the orbits that are as is known, by the values
-  while (before > known.place && beyond(kind, orbits[before].multipliers) != known.count) --before;
-  const Search search{kind, [kind](const ExaminedOrbit& orbit) { return beyond(kind, orbit.multipliers); },
-                      Examined::multipliers_too, 5};
+  while (before > known.place && count(orbits[before]) != known.count) --before;
+  const Search search{kind, count, Examined::multipliers_too, 5};
   LocatedEvent located = locate(corrector, search, orbits[before], orbits[before + 1]);
   const std::size_t since = known.place;
-  const int place = std::min(known.count, beyond(kind, orbits[last].multipliers));
-  located.event.change = beyond(kind, orbits[last].multipliers) - known.count;
+  const int place = std::min(known.count, count(orbits[last]));
+  located.event.change = count(orbits[last]) - known.count;
   known = {kind, known.count + located.event.change, last};
-  if (all_beyond(located.before) == all_beyond(located.after)) return {};
+  if (beyond({}, located.before, Moduli::found) == beyond({}, located.after, Moduli::found)) return {};
   // what the bar leaves open, by the slope between the orbits that are certain
   const auto from = modulus_of(kind, orbits[since].multipliers, place),
              to = modulus_of(kind, orbits[last].multipliers, place), at = modulus_of(kind, located.after, place);
-  const double distance = std::abs(orbits[last].corrected.parameter - orbits[since].corrected.parameter);
+  const double distance = std::abs(orbits[last].parameter - orbits[since].parameter);
   if (from && to && at) located.event.error += at->second * distance / std::abs(to->first - from->first);
   return located.event;
 }
 
-std::optional<BranchEvent> fold_among(BranchCorrector& corrector, const std::array<const ExaminedOrbit*, 3>& points)
+std::optional<BranchEvent> fold_among(BranchCorrector& corrector, const std::array<const BranchPoint*, 3>& points)
 {
-  std::array<const ExaminedOrbit*, 3> now = points; // the middle one is furthest: the fold is there or beyond
-  const auto parameter = [&](std::size_t i) { return now[i]->corrected.parameter; };
+  std::array<const BranchPoint*, 3> now = points; // the middle one is furthest: the fold is there or beyond
+  const auto parameter = [&](std::size_t i) { return now[i]->parameter; };
   // where the branch stands upright the parameter turns by the tolerance alone
   const double least = 1e-6 * corrector.scales.parameter;
   if (std::min(std::abs(parameter(1) - parameter(0)), std::abs(parameter(2) - parameter(1))) < least) return {};
   if (!((parameter(1) - parameter(0)) * (parameter(2) - parameter(1)) < 0)) return {};
   const double outwards = parameter(1) > parameter(0) ? 1 : -1;
-  std::array<ExaminedOrbit, 4> found;
+  std::array<BranchPoint, 4> found;
   double error = 0.5 * std::abs(parameter(2) - parameter(0));
-  for (ExaminedOrbit& orbit : found)
+  for (BranchPoint& orbit : found)
   {
     const double before = distance(corrector, *now[0], *now[1]), after = distance(corrector, *now[1], *now[2]);
     const double at = vertex({-before, 0, after}, {parameter(0), parameter(1), parameter(2)});
     const std::size_t side = at < 0 ? 0 : 1;
     const double part = std::clamp(at < 0 ? 1 + at / before : at / after, 0., 1.);
-    std::optional<CorrectedOrbit> corrected = correct_between(corrector, *now[side], *now[side + 1], part);
-    if (!corrected) break;
-    orbit = examine(corrector, std::move(*corrected), Examined::measures_alone);
-    const double further = outwards * (orbit.corrected.parameter - parameter(1));
+    std::optional<BranchPoint> point = correct_between(corrector, *now[side], *now[side + 1], part);
+    if (!point) break;
+    orbit = std::move(*point);
+    examine(corrector, orbit, Examined::measures_alone);
+    const double further = outwards * (orbit.parameter - parameter(1));
     error = std::abs(further);
     if (further > 0)
-      now = side == 0 ? std::array{now[0], static_cast<const ExaminedOrbit*>(&orbit), now[1]}
-                      : std::array{now[1], static_cast<const ExaminedOrbit*>(&orbit), now[2]};
+      now = side == 0 ? std::array{now[0], static_cast<const BranchPoint*>(&orbit), now[1]}
+                      : std::array{now[1], static_cast<const BranchPoint*>(&orbit), now[2]};
     else
       now[2 * side] = &orbit;
     if (error < least) break;

@@ -33,32 +33,16 @@ double scaled_product(const BranchCorrector& corrector, const BorderedVector& a,
 /// The orbit problem about the last point.
 OrbitProblem problem_of(const BranchCorrector& corrector);
 
-/// A closed orbit, and the value that it belongs to.
-struct CorrectedOrbit
-{
-  Orbit orbit;
-  double parameter = 0;
-  int iterations = 0;
-};
+BorderedVector vector_of(const BranchPoint& point);
 
-BorderedVector vector_of(const CorrectedOrbit& corrected);
-
-/// The closed orbit on the plane through `predicted` that is square to `normal`. None: it was not found.
-std::optional<CorrectedOrbit> correct(BranchCorrector& corrector, const BorderedVector& predicted,
-                                      const BorderedVector& normal);
+/// The closed orbit on the plane through `predicted` that is square to `normal`, not examined. None: it was not found.
+std::optional<BranchPoint> correct(BranchCorrector& corrector, const BorderedVector& predicted,
+                                   const BorderedVector& normal);
 
 /// The direction of the branch at a closed orbit, of scaled length 1, on the side of the direction `about`.
-BorderedVector tangent_at(BranchCorrector& corrector, const CorrectedOrbit& corrected, const BorderedVector& about);
+BorderedVector tangent_at(BranchCorrector& corrector, const BranchPoint& point, const BorderedVector& about);
 
 // Events between two points of a branch, and where they happen (src/README.md, section 9.3).
-
-/// A closed orbit with its multipliers and what is measured on it.
-struct ExaminedOrbit
-{
-  CorrectedOrbit corrected;
-  Multipliers multipliers;
-  PointMeasures measures;
-};
 
 /// Whether multipliers are asked for.
 enum class Examined
@@ -67,10 +51,11 @@ enum class Examined
   multipliers_too,
 };
 
-ExaminedOrbit examine(BranchCorrector& corrector, CorrectedOrbit corrected, Examined wanted);
+/// Measures a point.
+void examine(BranchCorrector& corrector, BranchPoint& point, Examined wanted);
 
 /// The events from one point to the next one but the folds and those of multipliers.
-std::vector<BranchEvent> events_between(BranchCorrector& corrector, const ExaminedOrbit& from, const ExaminedOrbit& to);
+std::vector<BranchEvent> events_between(BranchCorrector& corrector, const BranchPoint& from, const BranchPoint& to);
 
 /// How many multipliers of a kind are beyond the unit circle, and the last orbit of which that is certain.
 struct KnownBeyond
@@ -86,10 +71,10 @@ std::array<KnownBeyond, 2> known_beyond(const Multipliers& start);
 /// The event by which the last of a side's orbits has another number of multipliers beyond the unit circle than is
 /// known, whatever their bars: where |m| = 1, by what the bars leave of it. None where the number may be the same, or
 /// where multipliers only met on the real axis.
-std::optional<BranchEvent> crossing_among(BranchCorrector& corrector, const std::vector<ExaminedOrbit>& orbits,
+std::optional<BranchEvent> crossing_among(BranchCorrector& corrector, const std::vector<BranchPoint>& orbits,
                                           KnownBeyond& known);
 
 /// The turning point of the parameter near the second of three points in succession; none if it does not turn.
-std::optional<BranchEvent> fold_among(BranchCorrector& corrector, const std::array<const ExaminedOrbit*, 3>& points);
+std::optional<BranchEvent> fold_among(BranchCorrector& corrector, const std::array<const BranchPoint*, 3>& points);
 
 } // namespace squeal

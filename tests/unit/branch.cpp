@@ -139,9 +139,10 @@ TEST_CASE("a branch is followed round its fold down to its Hopf point, every poi
   for (const BranchPoint& point : branch.points)
   {
     // |x|^2 is r^2 at stiffness and mass 1; the residual of 1e-9 counts 1/|1 - m|-fold, which the fold makes large
-    const double square = point.fluctuation * point.fluctuation, m = std::exp(2 * pi * square * (1 - 2 * square));
+    const double square = point.orbit.fluctuation * point.orbit.fluctuation,
+                 m = std::exp(2 * pi * square * (1 - 2 * square));
     CHECK(point.parameter == doctest::Approx(square * square - square).epsilon(1e-7));
-    CHECK(point.period == doctest::Approx(2 * pi).epsilon(1e-8));
+    CHECK(point.orbit.period == doctest::Approx(2 * pi).epsilon(1e-8));
     REQUIRE(point.multipliers.values.size() == 1);
     CHECK(std::abs(point.multipliers.values[0] - m) < 1e-5);
     if (std::abs(m - 1) > 1e-3) CHECK(point.multipliers.stability == (m < 1 ? Stability::stable : Stability::unstable));

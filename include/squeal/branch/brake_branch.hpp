@@ -1,6 +1,5 @@
 #pragma once
-/// The branch of a brake's limit cycle along a number of its scene, beside the stability of its sliding equilibrium
-/// (src/README.md, section 9).
+/// The branch of a brake's limit cycle along a number of its scene (src/README.md, section 9).
 ///
 /// States are absolute, so that a change of the parameter changes the step alone.
 #include "squeal/branch/continuation.hpp"
@@ -9,30 +8,12 @@
 namespace squeal
 {
 
-/// The stability of the sliding equilibrium at a value of the parameter.
-struct EquilibriumStability
-{
-  double parameter = 0;
-  bool known = false;      // there is an equilibrium, and its modes converged
-  int unstable_modes = 0;  // in the band
-  double growth_rate = 0;  // [1/s] of the least stable mode that oscillates
-  double frequency_hz = 0; // of that mode
-};
-
-/// The stability of sliding beside a branch.
-struct SlidingStability
-{
-  std::vector<EquilibriumStability> equilibria{}; // by rising parameter
-  std::vector<BranchEvent> hopf{};                // where modes become unstable or stable, with the frequency of each
-};
-
 /// outcome: "converged" (both sides came to a bound, to first lift-off or to a Hopf point), "not converged" (how far
 /// they came), "skipped", "off".
 struct BrakeBranch
 {
   Outcome outcome;
-  Branch branch;                                // its events include those of the equilibrium
-  std::vector<EquilibriumStability> equilibria; // by rising parameter
+  Branch branch;
 };
 
 /// The cycle that is followed, the number that changes, and how each point is computed.
@@ -41,7 +22,6 @@ struct BrakeBranchProblem
   const BranchSettings& settings;
   std::function<BrakeModel(double parameter)> model_at; // with matrices of the layout of the scene's own
   CycleProblem own;                                     // of the scene itself
-  SlidingStability stability;                           // along the range
   const LimitCycle& cycle;                              // where the branch starts
   int steps_per_period = 0;
   double tolerance = 0; // on the full-space residual
@@ -56,8 +36,8 @@ std::string no_cycle_to_follow(const LimitCycle& cycle, double tolerance);
 /// since every point takes several periods. Not collective.
 int steps_along_branch(const CycleSettings& settings, const LimitCycle& cycle);
 
-/// Follows the cycle both ways from the scene's own value to the ends of the range, with the equilibrium beside it.
-/// Collective. Error: a value of the parameter makes no scene.
+/// Follows the cycle both ways from the scene's own value to the ends of the range. Collective. Error: a value of the
+/// parameter makes no scene.
 BrakeBranch find_branch(const BrakeBranchProblem& problem);
 
 } // namespace squeal

@@ -38,15 +38,14 @@ struct FlowFamily
   std::function<void()> renew_preconditioner{}; // makes it that of the period recorded last; empty: there is but one
 };
 
-/// A closed orbit of the branch.
+/// A closed orbit of the branch, and the value that it belongs to.
 struct BranchPoint
 {
+  Orbit orbit;
   double parameter = 0;
-  Owned<Vec> state;
-  double period = 0, residual = 0; // [s], [-]
-  double fluctuation = 0;          // |x - rest| in the energy norm
-  Multipliers multipliers;
-  PointMeasures measures;
+  int corrections = 0; // that it took
+  Multipliers multipliers{};
+  PointMeasures measures{};
 };
 
 /// What happens along a branch.
