@@ -1,6 +1,7 @@
 #include "point_modes.hpp"
 
 #include "squeal/algebra/dense_matrix.hpp"
+#include "squeal/base/disjoint_sets.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -67,36 +68,21 @@ struct Cluster
 
 /// The parts of the graph in which modes of both points are linked that share more than a trace, of those that are
 /// free.
-std::map<Index, Cluster> clusters_of(const MatrixXd& macs, const std::vector<char>& free_from,
-                                     const std::vector<char>& free_to)
+std::map<int, Cluster> clusters_of(const MatrixXd& macs, const std::vector<char>& free_from,
+                                   const std::vector<char>& free_to)
 {
   constexpr double trace = 0.02;
-  const auto free_places = [](const std::vector<char>& free)
-  {
-    Places places;
-    for (std::size_t k = 0; k < free.size(); ++k)
-      if (free[k]) places.push_back(static_cast<Index>(k));
-    return places;
-  };
-  const Places from = free_places(free_from), to = free_places(free_to);
-  std::map<Index, Index> part_from, part_to; // by the first member of the first point
-  for (const Index i : from) part_from[i] = i;
-  for (const Index j : to) part_to[j] = macs.rows();
-  for (bool changed = true; changed;)
-  {
-    changed = false;
-    for (const Index i : from)
-      for (const Index j : to)
-      {
-        Index &one = part_from[i], &other = part_to[j];
-        if (macs(i, j) < trace || one == other) continue;
-        one = other = std::min(one, other);
-        changed = true;
-      }
-  }
-  std::map<Index, Cluster> clusters;
-  for (const auto& [i, part] : part_from) clusters[part].from.push_back(i);
-  for (const auto& [j, part] : part_to) clusters[part].to.push_back(j);
+  const int first = static_cast<int>(free_from.size()), second = static_cast<int>(free_to.size());
+  DisjointSets sets(free_from.size() + free_to.size());
+  for (int i = 0; i < first; ++i)
+    for (int j = 0; j < second; ++j)
+      if (free_from[static_cast<std::size_t>(i)] && free_to[static_cast<std::size_t>(j)] && macs(i, j) >= trace)
+        sets.join(i, first + j);
+  std::map<int, Cluster> clusters;
+  for (int i = 0; i < first; ++i)
+    if (free_from[static_cast<std::size_t>(i)]) clusters[sets.least(i)].from.push_back(i);
+  for (int j = 0; j < second; ++j)
+    if (free_to[static_cast<std::size_t>(j)]) clusters[sets.least(first + j)].to.push_back(j);
   return clusters;
 }
 

@@ -248,9 +248,7 @@ double scale_of(const ModesBasis& modes, Complex lambda)
 
 bool correct(ModesBasis& modes, MultiVector residuals)
 {
-  PetscInt unknowns = 0;
-  check(MatGetSize(modes.K_z, &unknowns, nullptr));
-  if (residuals.columns() == 0 || modes.basis.shapes() >= unknowns) return false;
+  if (residuals.columns() == 0 || modes.basis.shapes() >= row_count(modes.K_z)) return false;
   orthonormalise(residuals, waiting_share * waiting_share);
   const MultiVector responses = modes.pencil.factor->solve(product(modes.Z_transposed, residuals));
   ++modes.passes;
@@ -282,9 +280,7 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   modes.K_z = project_symmetric(K.get() ? K.get() : structure.K.get(), modes.contact.Z);
   modes.Z_transposed = transpose_of(modes.contact.Z);
   const Owned<Mat> C_z = project_symmetric(modes.basis.C.matrix, modes.contact.Z);
-  check(MatNorm(modes.M_z, NORM_1, &modes.norms.M));
-  check(MatNorm(C_z, NORM_1, &modes.norms.C));
-  check(MatNorm(modes.K_z, NORM_1, &modes.norms.K));
+  modes.norms = {norm_of(modes.M_z, NORM_1), norm_of(C_z, NORM_1), norm_of(modes.K_z, NORM_1)};
   RealModes real;
   for (double part = basis_band; real.omega.size() < fewest && part < widest_band; part *= 2)
     real = solve_real_modes_below(modes.M_z, modes.K_z, part * problem.band, problem.options);

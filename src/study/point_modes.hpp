@@ -98,10 +98,8 @@ struct Match
 };
 
 /// A point with its modes on the basis, and the track of each.
-struct Followed
+struct Followed : SweptPlace
 {
-  std::vector<double> values;
-  bool reversed = false;
   bool inserted = false;
   int closed = 0; // pairs
   PointModes modes{};

@@ -57,9 +57,7 @@ struct ForcedPoint
 ForcedPoint make_forced_point(const ResponseProblem& problem, LinearisedPoint point)
 {
   const auto& [structure, interface, equilibrium] = problem.sliding;
-  PetscInt probes = 0;
-  check(MatGetSize(problem.probes, &probes, nullptr));
-  std::vector<int> all(static_cast<std::size_t>(probes));
+  std::vector<int> all(static_cast<std::size_t>(row_count(problem.probes)));
   std::iota(all.begin(), all.end(), 0);
   std::array forces{unit_forces(problem.probes, problem.excitations, point.contact.Y),
                     unit_forces(problem.probes, all, point.contact.Z)};
@@ -266,13 +264,11 @@ Response find_response(const ResponseProblem& problem)
   response.outcome.kind = OutcomeKind::converged;
   response.frequency_hz = problem.frequency_hz;
   response.excitations = problem.excitations;
-  PetscInt probes = 0, free = 0;
   LinearisedPoint point = linearise_point(problem.sliding);
-  check(MatGetSize(problem.probes, &probes, nullptr));
-  check(MatGetSize(point.contact.Z, nullptr, &free));
   const std::vector<std::complex<double>> nothing(problem.frequency_hz.size());
-  response.receptance.assign(problem.excitations.size(), {static_cast<std::size_t>(probes), nothing});
-  if (free == 0)
+  response.receptance.assign(problem.excitations.size(),
+                             {static_cast<std::size_t>(row_count(problem.probes)), nothing});
+  if (column_count(point.contact.Z) == 0)
     response.outcome.reason = "closed contact leaves nothing free to vibrate";
   else
   {

@@ -208,10 +208,6 @@ private:
     if (equilibrium.outcome.kind != OutcomeKind::converged || equilibrium.closed != own.closed) return std::nullopt;
     return residuals_at({model.structure, model.interface, equilibrium}, modes_);
   }
-  catch (const LibraryError&)
-  {
-    throw;
-  }
   catch (const Error&)
   {
     return std::nullopt;
@@ -299,13 +295,10 @@ void find_probe_derivatives(Mat probes, const HeldMode& mode, ModeCauses& causes
 /// A with `factor` times p p' of the probe's row p added.
 Owned<Mat> with_added(Mat A, Mat probes, int probe, double factor)
 {
-  PetscInt first = 0, last = 0, first_column = 0, last_column = 0;
-  check(MatGetOwnershipRange(probes, &first, &last));
-  check(MatGetOwnershipRangeColumn(probes, &first_column, &last_column));
-  const PetscInt own = probe >= first && probe < last ? 1 : 0;
+  const IndexRange own = own_columns(probes);
   Owned<IS> rows, columns;
-  check(ISCreateStride(comm_of(probes), own, probe, 1, rows.put()));
-  check(ISCreateStride(comm_of(probes), last_column - first_column, first_column, 1, columns.put()));
+  check(ISCreateStride(comm_of(probes), own_rows(probes).holds(probe), probe, 1, rows.put()));
+  check(ISCreateStride(comm_of(probes), own.size(), own.first, 1, columns.put()));
   Owned<Mat> row, square, result = copy_of(A);
   check(MatCreateSubMatrix(probes, rows, columns, MAT_INITIAL_MATRIX, row.put()));
   check(MatTransposeMatMult(row, row, MAT_INITIAL_MATRIX, PETSC_DEFAULT, square.put()));

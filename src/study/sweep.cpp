@@ -85,7 +85,7 @@ private:
     for (const std::vector<double>& values : line.points)
     {
       end_if_asked(comm_);
-      std::optional<Followed> now = evaluate({values, line.reversed});
+      std::optional<Followed> now = evaluate({{values, line.reversed}});
       progress_->update(static_cast<double>(++done_), "");
       if (!now) continue;
       if (!first_ || (line.ordered && !before))
@@ -100,7 +100,7 @@ private:
       {
         now->tracks = names_by_shapes(first_->modes, now->modes);
         record(*now, {});
-        model_.forget({now->values, now->reversed});
+        model_.forget(*now);
       }
       before = std::move(now);
     }
@@ -111,8 +111,8 @@ private:
   std::optional<Followed> evaluate(Followed point)
   {
     if (find_modes_of(point)) return point;
-    const auto recorded = [&](const SweepPoint& known)
-    { return known.inserted && known.values == point.values && known.reversed == point.reversed; };
+    const SweptPlace& place = point;
+    const auto recorded = [&](const SweepPoint& known) { return known.inserted && known == place; };
     if (!point.inserted || std::ranges::none_of(sweep_.points, recorded)) record(point, {});
     return std::nullopt;
   }
@@ -121,11 +121,11 @@ private:
   bool find_modes_of(Followed& point)
   {
     end_if_asked(comm_);
-    const Equilibrium& at = model_.equilibrium_at({point.values, point.reversed});
+    const Equilibrium& at = model_.equilibrium_at(point);
     point.closed = static_cast<int>(std::ranges::count(at.closed, 1));
     point.modes.outcome = at.outcome;
     if (at.outcome.kind == OutcomeKind::converged && problem_.settings.stages == SweepStages::modes)
-      point.modes = model_.modes_at({point.values, point.reversed}, tolerance_of(point));
+      point.modes = model_.modes_at(point, tolerance_of(point));
     if (point.modes.outcome.kind == OutcomeKind::converged) return true;
     point.modes.pairs.clear(); // of which some may be no modes
     return false;
@@ -164,8 +164,7 @@ private:
   /// What counts as clear where a step cannot be halved any further.
   double least_clear(const Followed& before, const Followed& now)
   {
-    const bool same = model_.same_pairs_closed({before.values, before.reversed}, {now.values, now.reversed});
-    return same ? clear_mac : clear_mac_across;
+    return model_.same_pairs_closed(before, now) ? clear_mac : clear_mac_across;
   }
 
   /// How finely a step between two points of a line is divided.
@@ -181,7 +180,7 @@ private:
   Division division_between(const Followed& before, const Followed& now)
   {
     const double size = std::max(std::abs(before.values[0]), std::abs(now.values[0]));
-    const Equilibrium& at = model_.equilibrium_at({now.values, now.reversed});
+    const Equilibrium& at = model_.equilibrium_at(now);
     const bool modes = problem_.settings.stages == SweepStages::modes; // which alone jump
     return {threshold_tolerance * size, modes ? std::ssize(at.closed) : 0, most_between};
   }
@@ -206,7 +205,7 @@ private:
   bool divided(Followed& before, Followed& now, int depth, bool clear, Division& division)
   {
     const bool halvable = depth < most_halvings;
-    const int changed = model_.changed_pairs({before.values, before.reversed}, {now.values, now.reversed});
+    const int changed = model_.changed_pairs(before, now);
     const bool many = changed > many_changes && halvable, halves = many || (halvable && !clear);
     if (!halves && (changed == 0 || division.left == 0)) return false;
     if (division.points <= 0)
@@ -270,8 +269,7 @@ private:
   bool divided_at_contact_change(Followed& before, Followed& now, int depth, Division& division)
   {
     if (division.left == 0) return false;
-    const std::optional<ContactChange> change =
-        model_.contact_change({before.values, before.reversed}, {now.values, now.reversed}, division.tolerance);
+    const std::optional<ContactChange> change = model_.contact_change(before, now, division.tolerance);
     if (!change) return false;
     --division.left;
     if (change->failed)
@@ -301,7 +299,7 @@ private:
   /// A point of the same line that is none of the scene.
   static Followed between_points(const Followed& of_line, double value)
   {
-    Followed point{of_line.values, of_line.reversed, true};
+    Followed point{of_line, true};
     point.values[0] = value;
     return point;
   }
@@ -351,7 +349,7 @@ private:
 
   void record(const Followed& now, const std::vector<Match>& matches)
   {
-    SweepPoint point{now.values, now.reversed, now.inserted, now.modes.outcome, now.closed, 0, {}};
+    SweepPoint point{now, now.inserted, now.modes.outcome, now.closed, 0, {}};
     for (std::size_t k = 0; k < now.modes.pairs.size(); ++k)
     {
       const TwoSidedPair& pair = now.modes.pairs[k];

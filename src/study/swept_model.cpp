@@ -46,10 +46,6 @@ const SweptModel::Known& SweptModel::known_at(const SweptPlace& place)
     for (std::size_t i = 0; i < known.rigid.size(); ++i)
       known.rigid[i] = known.rigid[i] && compliance_of(model_->interface, i) == 0;
   }
-  catch (const LibraryError&)
-  {
-    throw;
-  }
   catch (const Error& error)
   {
     model_.reset();
@@ -88,10 +84,6 @@ PointModes SweptModel::modes_at(const SweptPlace& place, double tolerance)
     if (common != basis_->closed) rebase(*basis_, basis_problem(equilibrium), common);
     modes = find_point_modes(
         *basis_, {{model_->structure, model_->interface, equilibrium}, problem_.modes.band, tolerance, end_if_asked_});
-  }
-  catch (const LibraryError&)
-  {
-    throw;
   }
   catch (const Error& error)
   {

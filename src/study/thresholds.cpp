@@ -147,7 +147,7 @@ private:
     {
       const int track = (gains ? b : a).tracks[place], name = track < 0 ? search_.tracks++ : track;
       if (gains) b.tracks[place] = name;
-      Threshold threshold{b.values, b.reversed, name,
+      Threshold threshold{b, name,
                           std::max(std::abs(high - low), search_.tolerance)}; // rounding has its part in shorter ones
       threshold.values[0] = (low + high) / 2;
       threshold.frequency_hz = frequency_hz_of((gains ? b : a).modes.pairs[place].lambda);

@@ -288,7 +288,7 @@ namespace
 /// Modes of these growth rates at a value.
 Followed followed(double value, const std::vector<double>& growth)
 {
-  Followed point{{value}};
+  Followed point{{{value}}};
   for (std::size_t k = 0; k < growth.size(); ++k) point.modes.pairs.push_back({{growth[k], 1.0 + k}, {}, {}});
   return point;
 }

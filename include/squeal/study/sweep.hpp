@@ -32,11 +32,9 @@ struct SweptPlace
 void reverse_rotation(Structure& structure, Interface& interface);
 
 /// outcome: that of the stage that ended the point: "converged", or what failed and why.
-struct SweepPoint
+struct SweepPoint : SweptPlace
 {
-  std::vector<double> values; // of the swept numbers
-  bool reversed = false;      // direction of rotation
-  bool inserted = false;      // between points of the scene: modes were unclear, or pairs open or close
+  bool inserted = false; // between points of the scene: modes were unclear, or pairs open or close
   Outcome outcome;
   int closed = 0;               // pairs
   int unstable = 0;             // modes in the band
@@ -44,10 +42,8 @@ struct SweepPoint
 };
 
 /// Where the growth rate of a followed mode passes zero along the first number.
-struct Threshold
+struct Threshold : SweptPlace
 {
-  std::vector<double> values; // of the swept numbers
-  bool reversed = false;
   int track = 0;
   double error = 0;        // of the first value
   double frequency_hz = 0; // of the mode there
