@@ -16,34 +16,6 @@ namespace squeal
 namespace
 {
 
-/// The numbers that a rule allows.
-struct Bounds
-{
-  double least, greatest;
-  bool open; // the bounds themselves are excluded
-  const char* text;
-};
-
-Bounds bounds_of(Rule rule)
-{
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  switch (rule)
-  {
-  case Rule::positive:
-    return {0, infinity, true, "a positive number (above 0)"};
-  case Rule::not_negative:
-    return {0, infinity, false, "zero or a positive number"};
-  case Rule::poisson:
-    return {-1, 0.5, true, "a number above -1 and below 0.5"};
-  case Rule::fraction:
-    return {std::numeric_limits<double>::min(), 1, false, "a number above 0 and at most 1"};
-  case Rule::below_two:
-    return {0, std::nextafter(2, 0), false, "a number of 0 or above and below 2"};
-  default:
-    return {-infinity, infinity, false, "a finite number"};
-  }
-}
-
 /// Reads one value into any of the members that a key may have.
 class ValueReader
 {
@@ -237,7 +209,7 @@ private:
 
   double number(const toml::node& node) const
   {
-    const std::string expected = bounds_of(value_.key.rule).text;
+    const std::string expected = bounds_of(value_.key.rule).expected;
     const double value = finite(node, expected + (node.is_number() ? "" : ", not " + kind_of(node)));
     need_allowed(node, value_.key.rule, value);
     return value;
@@ -339,13 +311,36 @@ void set_by_word(const std::string& place, const SceneKey& key, const std::strin
   read_value({key, "", {}, place}, *given.get("value"));
 }
 
+const Bounds& bounds_of(Rule rule)
+{
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  constexpr Bounds any{-infinity, infinity, false, "a finite number", ""};
+  constexpr auto no_bounds = [=](const char* page) {
+    return Bounds{any.least, any.greatest, any.open, any.expected, page};
+  };
+  static constexpr std::array bounds = {
+      any,
+      Bounds{0, infinity, true, "a positive number (above 0)", "above 0"},
+      Bounds{0, infinity, false, "zero or a positive number", "0 or above"},
+      Bounds{-1, 0.5, true, "a number above -1 and below 0.5", "above -1, below 0.5"},
+      Bounds{std::numeric_limits<double>::min(), 1, false, "a number above 0 and at most 1", "above 0, at most 1"},
+      no_bounds("direction"),
+      no_bounds("zero: none"),
+      no_bounds("no negative xx, yy or zz"),
+      no_bounds("existing file"),
+      no_bounds("existing folder"),
+      Bounds{0, 2 - std::numeric_limits<double>::epsilon(), false, "a number of 0 or above and below 2",
+             "0 or above, below 2"}};
+  return bounds[static_cast<std::size_t>(rule)];
+}
+
 std::string problem_of_number(Rule rule, double value)
 {
-  const Bounds bounds = bounds_of(rule);
+  const Bounds& bounds = bounds_of(rule);
   const bool inside =
       bounds.open ? value > bounds.least && value < bounds.greatest : value >= bounds.least && value <= bounds.greatest;
   if (!std::isfinite(value)) return "a finite number";
-  if (!inside) return bounds.text;
+  if (!inside) return bounds.expected;
   return std::abs(value) > largest_number ? "a number of at most 1e100 in size, so that powers of it are finite" : "";
 }
 

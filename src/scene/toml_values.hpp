@@ -34,6 +34,16 @@ void apply_override(toml::table& root, const std::string& text);
 /// The words of a key between its dots; a word in quotes may hold dots.
 std::vector<std::string> words_of_key(const std::string& key);
 
+/// The numbers that a rule allows.
+struct Bounds
+{
+  double least, greatest;
+  bool open;                   // the bounds themselves are excluded
+  const char *expected, *page; // in messages, and on the page of keys
+};
+
+const Bounds& bounds_of(Rule rule);
+
 /// The values that a rule wants instead of one; empty: the rule allows it.
 std::string problem_of_number(Rule rule, double value);
 

@@ -142,21 +142,10 @@ SceneKeys keys_of_table(const TableTarget& table)
 /// What a key's value must be: one of its words, or a number by its rule. Empty: the unit says it.
 std::string rule_text(const SceneKey& key)
 {
-  static constexpr std::array rules = {"",
-                                       "above 0",
-                                       "0 or above",
-                                       "above -1, below 0.5",
-                                       "above 0, at most 1",
-                                       "direction",
-                                       "zero: none",
-                                       "no negative xx, yy or zz",
-                                       "existing file",
-                                       "existing folder",
-                                       "0 or above, below 2"};
   Words words;
   if (const auto* choice = std::get_if<Choice>(&key.target)) words = choice->words;
   if (const auto* start = std::get_if<StartTarget>(&key.target)) words = start->kind.words;
-  std::string text = rules.at(static_cast<std::size_t>(key.rule));
+  std::string text = bounds_of(key.rule).page;
   for (const char* one : words) text += (text.empty() ? "" : ", ") + markdown_code(one);
   return text;
 }
