@@ -130,9 +130,7 @@ void check_circulatory_part(const Scene& scene, const Model& model)
   if (scene.transient.enabled || scene.cycle.enabled)
     throw Error(folder + ": its circulatory part (H.petsc, or an unsymmetric K.petsc) is for the modes; time steps "
                          "need a symmetric stiffness: take [transient] and [cycle] out");
-  double load = 0;
-  check(VecNorm(structure.load, NORM_INFINITY, &load));
-  if (model.interface.pairs > 0 || load > 0)
+  if (model.interface.pairs > 0 || norm_of(structure.load, NORM_INFINITY) > 0)
     throw Error(folder +
                 ": a circulatory part (H.petsc, or an unsymmetric K.petsc) is for modes alone, without contact "
                 "pairs and load: take B, gap, drive and F out, or bring friction in by pairs");
@@ -144,10 +142,7 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
   Structure& structure = model.structure;
   structure = read_structure(*scene.matrices, comm);
   model.interface = read_interface(*scene.matrices, structure, scene.friction, comm);
-  PetscInt size = 0, local_size = 0;
-  check(VecGetSize(structure.load, &size));
-  check(VecGetLocalSize(structure.load, &local_size));
-  const MatrixRows rows = read_matrix_rows(*scene.matrices, size, comm);
+  const MatrixRows rows = read_matrix_rows(*scene.matrices, entry_count(structure.load), comm);
   add_damping(structure, scene.damping);
   const Owned<Vec> given = copy_of(structure.load.get());
   add_forces(rows, scene.forces, structure.load);
@@ -159,7 +154,7 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
                              add_forces(rows, loaded.forces, load);
                              return load;
                            });
-  model.probes = probe_rows(scene.probes, rows, local_size, comm);
+  model.probes = probe_rows(scene.probes, rows, own_range(structure.load).size(), comm);
   const auto held = held_rows(rows, scene.supports);
   name_rows(rows, held, structure.names);
   check_circulatory_part(scene, model);
@@ -251,136 +246,83 @@ Model build_model(Scene& scene, MPI_Comm comm)
 {
   Model model =
       scene.matrices ? model_of_matrices(scene, comm) : model_of_mesh(scene, read_mesh_unless_ended(scene, comm), comm);
-  double mass = 0;
-  check(MatNorm(model.structure.M, NORM_1, &mass));
-  if (mass == 0 && (scene.modes.enabled || scene.transient.enabled || scene.cycle.enabled))
+  if (norm_of(model.structure.M, NORM_1) == 0 &&
+      (scene.modes.enabled || scene.transient.enabled || scene.cycle.enabled))
     throw Error("the structure has no mass, so it has no modes and no motion: give its points masses, or M.petsc "
                 "entries; or turn the modes off for the equilibrium alone");
   return model;
 }
 
 NearbyModels::NearbyModels(const Model& model, const Scene& scene)
-    : model_(model), scene_(scene),
-      comm_(comm_of(model.structure.load)), own_{sharing(model.structure, model.interface), Values{}}
+    : model_(model), scene_(scene), comm_(comm_of(model.structure.load))
 {
-}
-
-std::set<Effect> NearbyModels::changes(const Known& known, const Values& values) const
-{
-  if (!known.values) return {Effect::mesh};
-  std::set<Effect> changed;
-  // A number that does not say what it changes may change everything.
-  const auto effect_of = [&](const std::string& key)
-  {
-    const Effect effect = description_of(scene_, key).effect;
-    return effect == Effect::nothing ? Effect::mesh : effect;
-  };
-  const auto compare = [&](const Values& these, const Values& others)
-  {
-    for (const auto& [key, value] : these)
-      if (const auto other = others.find(key); other == others.end() || other->second != value)
-        changed.insert(effect_of(key));
-  };
-  compare(values, *known.values);
-  compare(*known.values, values);
-  return changed;
 }
 
 const NumberedMesh& NearbyModels::numbered(const Scene& scene)
 {
-  if (numbered_) return *numbered_;
-  numbered_ = number_mesh(scene, with_points(model_.mesh, scene), pairs_, comm_);
-  ++made_.mesh;
+  if (!numbered_) numbered_ = number_mesh(scene, with_points(model_.mesh, scene), pairs_, comm_);
   return *numbered_;
 }
 
-BrakeModel NearbyModels::made_from_files(const Scene& scene)
+BrakeModel NearbyModels::made_of_mesh(const Scene& scene, const std::set<Effect>& changed)
 {
-  last_.model = {};
-  Model model = model_of_matrices(scene, comm_);
-  ++made_.matrices;
-  ++made_.load;
-  ++made_.contact;
-  return {std::move(model.structure), std::move(model.interface)};
-}
-
-BrakeModel NearbyModels::made_of_mesh(const Scene& scene, const std::set<Effect>& from_own,
-                                      const std::set<Effect>& from_last)
-{
-  const auto serves = [](const std::set<Effect>& changed, std::initializer_list<Effect> effects)
-  { return std::ranges::none_of(effects, [&](Effect effect) { return changed.contains(effect); }); };
-  // The model at hand whose part no change enters; null: the part is to be made.
-  const auto at_hand = [&](std::initializer_list<Effect> effects) -> const BrakeModel*
-  {
-    if (serves(from_own, effects)) return &own_.model;
-    return serves(from_last, effects) ? &last_.model : nullptr;
-  };
-  const BrakeModel *const mass_of = at_hand({Effect::mesh, Effect::stiffness_and_mass, Effect::mass}),
-                          *const stiffness_of = at_hand({Effect::mesh, Effect::stiffness_and_mass}),
-                          *const loss_of = at_hand({Effect::mesh, Effect::stiffness_and_mass, Effect::damping}),
-                          *const damping_of =
-                              at_hand({Effect::mesh, Effect::stiffness_and_mass, Effect::mass, Effect::damping}),
-                          *const load_of = has_preload(scene) ? nullptr : at_hand({Effect::mesh, Effect::load}),
-                          *const rows_of = at_hand({Effect::mesh, Effect::drive}),
-                          *const contact_of = at_hand({Effect::mesh, Effect::drive, Effect::gap});
-  BrakeModel next;
-  if (damping_of)
-    next = sharing(damping_of->structure, {});
-  else
-  {
-    for (const auto& [of, matrix] : {std::pair{mass_of, &Structure::M}, {stiffness_of, &Structure::K}})
-      if (!of) last_.model.structure.*matrix = {}; // not beside the new one
-    last_.model.structure.C = {};
-    next.structure = assemble(numbered(scene), scene, comm_);
-    ++made_.matrices;
-  }
+  const bool moved = changed.contains(Effect::mesh);
+  const auto stays = [&](std::initializer_list<Effect> effects)
+  { return !moved && std::ranges::none_of(effects, [&](Effect effect) { return changed.contains(effect); }); };
+  const bool keeps_stiffness = stays({Effect::stiffness_and_mass}), keeps_rows = stays({Effect::drive});
+  if (moved) numbered_.reset();
+  const Structure& own = model_.structure;
+  BrakeModel next = sharing(own, model_.interface);
   Structure& structure = next.structure;
-  if (mass_of) structure.M = shared(mass_of->structure.M.get());
-  if (stiffness_of) structure.K = shared(stiffness_of->structure.K.get());
-  if (stiffness_of) structure.G = shared(stiffness_of->structure.G.get());
-  if (loss_of) structure.K_loss = shared(loss_of->structure.K_loss.get());
-  if (load_of)
-    share_loads(load_of->structure, structure);
+  if (!keeps_stiffness || !stays({Effect::mass, Effect::damping}))
+  {
+    structure = assemble(numbered(scene), scene, comm_);
+    if (keeps_stiffness && stays({Effect::mass})) structure.M = shared(own.M.get());
+    if (keeps_stiffness) structure.K = shared(own.K.get());
+    if (keeps_stiffness) structure.G = shared(own.G.get());
+    if (keeps_stiffness && stays({Effect::damping})) structure.K_loss = shared(own.K_loss.get());
+  }
+  if (!has_preload(scene) && stays({Effect::load}))
+    share_loads(own, structure);
   else
   {
     structure.load = assemble_load(numbered(scene).mesh, scene, numbered(scene).dofs, comm_);
     assemble_preload(structure, numbered(scene), scene, comm_);
     structure.path = path_of_mesh(structure, scene, numbered(scene), comm_);
-    ++made_.load;
   }
-  if (contact_of)
-    next.interface = sharing({}, contact_of->interface).interface;
-  else
+  if (!keeps_rows || !stays({Effect::gap}))
   {
     const NumberedMesh& mesh = numbered(scene);
     next.interface = make_interface(pairs_.pairs, scene, mesh.dofs, comm_);
-    ++made_.contact;
-    if (rows_of) next.interface.B = shared(rows_of->interface.B.get());
+    if (keeps_rows) next.interface.B = shared(model_.interface.B.get());
   }
+  if (moved) numbered_.reset();
   return next;
 }
 
 BrakeModel NearbyModels::at(std::span<const SceneNumber> numbers)
 {
   const Scene scene = scene_with(scene_, numbers);
-  Values values;
-  for (const auto& [key, value] : driven_by(scene_, numbers)) values[key] = value;
-  const std::set<Effect> from_own = changes(own_, values), from_last = changes(last_, values);
-  last_.values.reset(); // until the next model is made
-  if (from_last.contains(Effect::mesh)) numbered_.reset();
-  const auto is_friction = [](Effect effect) { return effect == Effect::friction; };
+  std::set<Effect> changed;
+  for (const SceneNumber& number : driven_by(scene_, numbers))
+  {
+    const Effect effect = description_of(scene_, number.key).effect;
+    changed.insert(effect == Effect::nothing ? Effect::mesh : effect); // what it does not say may be everything
+  }
+  BrakeModel model;
   if (!scene.matrices)
-    last_.model = made_of_mesh(scene, from_own, from_last);
-  else if (std::ranges::all_of(from_own, is_friction))
-    last_.model = sharing(own_.model.structure, own_.model.interface);
-  else if (!std::ranges::all_of(from_last, is_friction))
-    last_.model = made_from_files(scene);
-  Interface& interface = last_.model.interface;
-  interface.friction = friction_of_pairs(scene, interface.geometry);
-  check_interface(interface, "contact", comm_);
-  tighten(last_.model.structure, interface);
-  last_.values = std::move(values);
-  return sharing(last_.model.structure, interface);
+    model = made_of_mesh(scene, changed);
+  else if (std::ranges::all_of(changed, [](Effect effect) { return effect == Effect::friction; }))
+    model = sharing(model_.structure, model_.interface);
+  else
+  {
+    Model made = model_of_matrices(scene, comm_);
+    model = {std::move(made.structure), std::move(made.interface)};
+  }
+  model.interface.friction = friction_of_pairs(scene, model.interface.geometry);
+  check_interface(model.interface, "contact", comm_);
+  tighten(model.structure, model.interface);
+  return model;
 }
 
 void add_shifts(const Scene& scene, const Model& model, std::vector<double>& values)
@@ -394,10 +336,7 @@ void add_shifts(const Scene& scene, const Model& model, std::vector<double>& val
 
 std::vector<double> probe_values(Mat probes, Vec u)
 {
-  Owned<Vec> values;
-  check(MatCreateVecs(probes, nullptr, values.put()));
-  check(MatMult(probes, u, values));
-  return all_entries(values);
+  return all_entries(product(probes, u));
 }
 
 } // namespace squeal

@@ -14,17 +14,8 @@ namespace squeal
 /// structure and the interface; no mass. Rank 0 reads the mesh.
 Model build_model(Scene& scene, MPI_Comm comm);
 
-/// How often the parts of models were made.
-struct PartsMade
-{
-  int mesh = 0;     // its numbering and pairs
-  int matrices = 0; // those of the structure that a number changes
-  int load = 0;
-  int contact = 0; // rows, gaps and drive of the pairs
-};
-
 /// Models of a scene with other values of its numbers, on the same mesh and in the same layout. A part that no changed
-/// number enters is shared with the model before, or with the scene's own: the handles of matrices are then equal.
+/// number enters is shared with the scene's own model: the handles of matrices are then equal.
 class NearbyModels
 {
 public:
@@ -36,30 +27,16 @@ public:
   BrakeModel at(std::span<const SceneNumber> numbers);
 
   MPI_Comm comm() const { return comm_; }
-  const PartsMade& made() const { return made_; }
 
 private:
-  using Values = std::map<std::string, double>;
-
-  /// A model at hand, by its values of numbers.
-  struct Known
-  {
-    BrakeModel model{};
-    std::optional<Values> values{}; // nothing: there is no model
-  };
-
-  std::set<Effect> changes(const Known& known, const Values& values) const;
-  BrakeModel made_from_files(const Scene& scene);
-  BrakeModel made_of_mesh(const Scene& scene, const std::set<Effect>& from_own, const std::set<Effect>& from_last);
+  BrakeModel made_of_mesh(const Scene& scene, const std::set<Effect>& changed);
   const NumberedMesh& numbered(const Scene& scene);
 
   const Model& model_;
   const Scene& scene_;
   MPI_Comm comm_;
-  Known own_{}, last_{};
-  std::optional<NumberedMesh> numbered_{};
+  std::optional<NumberedMesh> numbered_{}; // of the scene's own mesh, once a part is made of it
   ContactPairs pairs_{};
-  PartsMade made_{};
 };
 
 /// Description of the model, as far as it is known before anything is solved; warnings and length on rank 0.

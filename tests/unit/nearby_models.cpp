@@ -28,12 +28,6 @@ Scene two_points()
   return scene;
 }
 
-/// Numbers of parts that are made: numbering, matrices, load, contact.
-std::array<int, 4> counts(const PartsMade& made)
-{
-  return {made.mesh, made.matrices, made.load, made.contact};
-}
-
 /// Whether M, C, K, the load and B are the same objects.
 std::array<bool, 5> shared_parts(const BrakeModel& a, const BrakeModel& b)
 {
@@ -71,7 +65,6 @@ void check_model(const BrakeModel& model, const Scene& scene, const std::vector<
 struct Kind
 {
   SceneNumber number;
-  std::array<int, 4> made;       // mesh, matrices, load, contact
   std::array<bool, 5> same_part; // as the scene's own: M, C, K, load, B
 };
 
@@ -83,26 +76,22 @@ TEST_CASE("a number makes anew the parts that it enters alone, whatever number w
   const Model model = build_model(scene, PETSC_COMM_WORLD);
   NearbyModels models(model, scene);
   const BrakeModel own = models.at({});
-  CHECK(counts(models.made()) == std::array<int, 4>{0, 0, 0, 0});
   CHECK(own.structure.K.get() == model.structure.K);
   const std::vector<Kind> kinds = {
-      {{"friction.coefficient", 0.4}, {0, 0, 0, 0}, {true, true, true, true, true}},
-      {{"contact.0.gap", -1e-6}, {1, 0, 0, 1}, {true, true, true, true, true}}, // numbers the mesh, once
-      {{"contact.0.compliance", 1e-9}, {0, 0, 0, 1}, {true, true, true, true, true}},
-      {{"contact.0.velocity.0", 2}, {0, 0, 0, 1}, {true, true, true, true, false}},
-      {{"force.0.vector.2", -7}, {0, 0, 1, 0}, {true, true, true, false, true}},
-      {{"spring.0.damping", 3}, {0, 1, 0, 0}, {true, false, true, true, true}},
-      {{"point.tip.mass", 2}, {0, 1, 0, 0}, {false, false, true, true, true}},
-      {{"spring.0.stiffness", 3e5}, {0, 1, 0, 0}, {true, false, false, true, true}},
-      {{"point.tip.at.2", 0.2}, {1, 1, 1, 1}, {false, false, false, false, false}},
+      {{"friction.coefficient", 0.4}, {true, true, true, true, true}},
+      {{"contact.0.gap", -1e-6}, {true, true, true, true, true}},
+      {{"contact.0.compliance", 1e-9}, {true, true, true, true, true}},
+      {{"contact.0.velocity.0", 2}, {true, true, true, true, false}},
+      {{"force.0.vector.2", -7}, {true, true, true, false, true}},
+      {{"spring.0.damping", 3}, {true, false, true, true, true}},
+      {{"point.tip.mass", 2}, {false, false, true, true, true}},
+      {{"spring.0.stiffness", 3e5}, {true, false, false, true, true}},
+      {{"point.tip.at.2", 0.2}, {false, false, false, false, false}},
   };
   for (const Kind& kind : kinds)
   {
     CAPTURE(kind.number.key);
-    std::array<int, 4> made = counts(models.made());
     const BrakeModel changed = models.at({&kind.number, 1});
-    for (std::size_t i = 0; i < made.size(); ++i) made[i] = counts(models.made())[i] - made[i];
-    CHECK(made == kind.made);
     std::array<bool, 5> same = shared_parts(changed, own);
     if (kind.number.key == "spring.0.stiffness") same[0] = true; // of one assembly with K
     CHECK(same == kind.same_part);
@@ -131,21 +120,4 @@ TEST_CASE("weights of a coupling make its rows anew")
     const SceneNumber number{"coupling.mean.weights.0", weight};
     check_model(models.at({&number, 1}), scene, {number});
   }
-}
-
-TEST_CASE("on a grid of a stiffness and the friction coefficient the matrices are made once a stiffness")
-{
-  Scene scene = two_points();
-  const Model model = build_model(scene, PETSC_COMM_WORLD);
-  NearbyModels models(model, scene);
-  const std::vector<std::string> keys = {"spring.0.stiffness", "friction.coefficient"};
-  for (const double stiffness : {2e5, 3e5, 4e5})
-    for (const double friction : {0.1, 0.2, 0.5})
-    {
-      const std::array values{stiffness, friction};
-      check_model(models.at(numbers_of(keys, values)), scene, numbers_of(keys, values));
-    }
-  CHECK(models.made().matrices == 3);
-  CHECK(models.made().load == 0);
-  CHECK(models.made().contact == 0);
 }
