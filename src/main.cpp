@@ -170,11 +170,7 @@ int run_program(const Arguments& arguments)
   if (arguments.options_in_variable && rank_of(comm) == 0)
     std::printf("options come from the command line and from the variable PETSC_OPTIONS\n");
   ProgramOptions options = read_program_options(comm);
-  options.force = arguments.force;
-  options.resolve = arguments.resolve;
-  options.length = arguments.verbose ? TableLength::full : TableLength::brief;
-  options.program = arguments.program;
-  options.command = arguments.command;
+  options.arguments = arguments;
   Scene scene;
   on_every_rank(comm, [&] { scene = read_scene(arguments.scene, arguments.overrides); });
   if (scene.mesh && arguments.allow_scripts) scene.mesh->statements = Statements::any;
@@ -239,7 +235,7 @@ void end_all(int rank, const char* kind, const char* text)
 }
 
 /// Of a failure that all ranks share; a name of any length may be in it.
-void print_error(int rank, const Error& error)
+void print_error(int rank, const std::exception& error)
 {
   if (rank == 0) std::fprintf(stderr, "squeal: error: %.3000s\n", error.what());
 }

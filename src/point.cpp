@@ -199,31 +199,29 @@ bool seeks_modes(const Scene& scene)
 
 std::string why_off(Stage which, const SlidingPoint& point, const Scene& scene)
 {
-  const auto unless = [](bool is_asked, const char* reason) { return std::string(is_asked ? "" : reason); };
+  const std::string no_table = format("the scene has no [%s]", word(which)), turned_off = "the scene turns it off";
   switch (which)
   {
   case Stage::modes:
-    return unless(seeks_modes(scene) || scene.response, "the scene turns it off");
+    return seeks_modes(scene) || scene.response ? "" : turned_off;
   case Stage::estimate:
-    return unless(scene.estimate.enabled || scene.cycle.enabled || follows_a_mode(scene.transient),
-                  "the scene turns it off");
+    return scene.estimate.enabled || scene.cycle.enabled || follows_a_mode(scene.transient) ? "" : turned_off;
   case Stage::response:
-    return unless(scene.response.has_value(), "the scene has no [response]");
+    return scene.response ? "" : no_table;
   case Stage::transient:
-    return unless(scene.transient.enabled, "the scene has no [transient], or turns it off");
+    return scene.transient.enabled ? "" : no_table + ", or turns it off";
   case Stage::cycle:
-    return unless(scene.cycle.enabled, "the scene has no [cycle], or turns it off");
+    return scene.cycle.enabled ? "" : no_table + ", or turns it off";
   case Stage::attractors:
-    return unless(starts_sought(point, scene).has_value(),
-                  "cycle.starts is 0, and no other starts are sought by themselves");
+    return starts_sought(point, scene) ? "" : "cycle.starts is 0, and no other starts are sought by themselves";
   case Stage::branch:
-    return unless(scene.branch.has_value(), "the scene has no [branch]");
+    return scene.branch ? "" : no_table;
   case Stage::sensitivity:
-    return unless(scene.sensitivity.has_value(), "the scene has no [sensitivity]");
+    return scene.sensitivity ? "" : no_table;
   case Stage::sweep:
-    return unless(scene.sweep.has_value(), "the scene has no [sweep]");
+    return scene.sweep ? "" : no_table;
   case Stage::robustness:
-    return unless(scene.robustness.has_value(), "the scene has no [robustness]");
+    return scene.robustness ? "" : no_table;
   default:
     return {};
   }

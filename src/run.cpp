@@ -133,9 +133,9 @@ ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results,
 {
   Report report;
   report.run = results.run();
-  report.program = options.program;
+  report.program = options.arguments.program;
   if (const int ranks = ranks_of(comm); ranks > 1) report.command = "mpirun -n " + std::to_string(ranks) + " ";
-  report.command += options.command;
+  report.command += options.arguments.command;
   report.place = results.place();
   const StageRunner runner = [&](Stage which, const std::function<bool()>& work)
   { return run_or_leave_out(report, which, comm, work); };
@@ -148,7 +148,7 @@ ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results,
   end_if_asked(comm);
   const Forecast forecast = forecast_of(model, scene, options);
   if (rank_of(comm) == 0) std::printf("%s", factor_text(forecast).c_str());
-  if (!options.force) agree(comm, problem_of(forecast, comm));
+  if (!options.arguments.force) agree(comm, problem_of(forecast, comm));
 
   const auto save = [&] { write_results(report, scene, model, results.partial(), comm); };
   const auto stage = [&](Stage which, auto& result, const auto& work)
@@ -160,7 +160,7 @@ ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results,
   if (point.equilibrium.outcome.kind == OutcomeKind::converged)
   {
     report.contacts = contact_resultants(model.interface, point.equilibrium.reactions, scene.contacts);
-    check(VecNorm(point.equilibrium.u, NORM_INFINITY, &report.displacement));
+    report.displacement = norm_of(point.equilibrium.u, NORM_INFINITY);
     report.equilibrium_probes = probe_values(model.probes, point.equilibrium.u);
     add_shifts(scene, model, report.equilibrium_probes);
     for (const TightBolt& bolt : model.structure.bolts)
@@ -188,7 +188,7 @@ ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results,
   if (code != ExitCode::interrupted) check_options_used(stages_run(report), comm);
   save();
   results.publish(code == ExitCode::interrupted ? Checkpoints::kept : Checkpoints::removed);
-  print_table(report, scene, options.length, comm);
+  print_table(report, scene, options.arguments.verbose ? TableLength::full : TableLength::brief, comm);
   print_end(report, results, comm);
   return code;
 }
@@ -203,7 +203,7 @@ void dry_run(Scene scene, const ProgramOptions& options, MPI_Comm comm)
   if (rank_of(comm) == 0) std::printf("%s", text_of(forecast).c_str());
   const std::string problem = problem_of(forecast, comm);
   if (rank_of(comm) == 0 && !problem.empty()) std::printf("  WARNING: here %s\n", problem.c_str());
-  if (rank_of(comm) == 0 && options.resolve)
+  if (rank_of(comm) == 0 && options.arguments.resolve)
     std::printf("# the scene, every default written out\n%s", resolved_scene(scene).c_str());
 }
 

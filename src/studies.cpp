@@ -63,8 +63,17 @@ Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const
 namespace
 {
 
+/// The sweep of these points, on models near the scene's own.
+SweepProblem sweep_problem(NearbyModels& models, SweepSettings settings, const Scene& scene,
+                           const ProgramOptions& options, const char* name)
+{
+  const auto model_at = [&models, key = settings.key](std::span<const double> values)
+  { return models.at(numbers_of(key, values)); };
+  return {std::move(settings), model_at, scene.modes, options.modes, options.equilibrium, name};
+}
+
 /// The stability of sliding at the scene's own value and at others spread evenly over the range of its branch.
-SlidingStability stability_beside_branch(NearbyModels& models, const Scene& scene, const ProgramOptions& options)
+Sweep sliding_beside_branch(NearbyModels& models, const Scene& scene, const ProgramOptions& options)
 {
   constexpr int intervals = 10;
   const BranchSettings& branch = *scene.branch;
@@ -74,35 +83,30 @@ SlidingStability stability_beside_branch(NearbyModels& models, const Scene& scen
   settings.key = {branch.key};
   settings.values.assign(values.begin(), values.end());
   settings.directions = SweepDirections::one;
-  const auto model_at = [&](std::span<const double> value) { return models.at(numbers_of(settings.key, value)); };
-  const Sweep sweep = run_sweep({settings, model_at, scene.modes, options.modes, options.equilibrium}, models.comm());
+  Sweep sweep = run_sweep(sweep_problem(models, settings, scene, options, "sweep"), models.comm());
   if (sweep.outcome.kind == OutcomeKind::interrupted) throw Interrupted{};
-  SlidingStability stability;
-  for (const SweepPoint& point : sweep.points)
-  {
-    if (point.inserted) continue;
-    EquilibriumStability& at = stability.equilibria.emplace_back(point.values[0]);
-    at.known = point.outcome.kind == OutcomeKind::converged;
-    at.unstable_modes = point.unstable;
-    const auto least_stable = std::ranges::find_if(point.modes, [](const SweptMode& m) { return m.lambda.imag() > 0; });
-    if (least_stable == point.modes.end()) continue;
-    at.growth_rate = least_stable->lambda.real();
-    at.frequency_hz = frequency_hz_of(least_stable->lambda);
-  }
-  for (const Threshold& at : sweep.thresholds)
+  std::erase_if(sweep.points, [](const SweepPoint& point) { return point.inserted; });
+  return sweep;
+}
+
+/// Where modes of sliding become unstable or stable.
+std::vector<BranchEvent> hopf_points(const Sweep& sliding)
+{
+  std::vector<BranchEvent> points;
+  for (const Threshold& at : sliding.thresholds)
     if (at.frequency_hz > 0)
-      stability.hopf.push_back({BranchEventKind::hopf, at.values[0], at.error, 1 / at.frequency_hz, 0, at.change});
-  return stability;
+      points.push_back({BranchEventKind::hopf, at.values[0], at.error, 1 / at.frequency_hz, 0, at.change});
+  return points;
 }
 
 } // namespace
 
-BrakeBranch run_branch(const SlidingPoint& point, const Motion& motion, const Scene& scene,
+BranchStudy run_branch(const SlidingPoint& point, const Motion& motion, const Scene& scene,
                        const ProgramOptions& options)
 {
   const double tolerance = scene.cycle.tolerance > 0 ? scene.cycle.tolerance : plain_tolerance;
   const std::string reason = no_cycle_to_follow(motion.cycle, tolerance);
-  if (!reason.empty()) return not_run<BrakeBranch>(OutcomeKind::skipped, reason);
+  if (!reason.empty()) return not_run<BranchStudy>(OutcomeKind::skipped, reason);
   NearbyModels models(*point.model, scene);
   const auto model_at = [&](double parameter) {
     return models.at(std::array{SceneNumber{scene.branch->key, parameter}});
@@ -111,9 +115,14 @@ BrakeBranch run_branch(const SlidingPoint& point, const Motion& motion, const Sc
   const CycleProblem own{
       point.sliding(), *point.linearised, point.modes.modes, {std::span(point.modes.modes).subspan(followed, 1), {}},
       scene.cycle,     options.step,      options.modes,     point.model->probes};
-  return find_branch({*scene.branch, model_at, own, stability_beside_branch(models, scene, options), motion.cycle,
-                      steps_along_branch(scene.cycle, motion.cycle), tolerance, options.equilibrium,
-                      options.cycle.shooting});
+  Sweep beside = sliding_beside_branch(models, scene, options);
+  BranchStudy study{
+      find_branch({*scene.branch, model_at, own, motion.cycle, steps_along_branch(scene.cycle, motion.cycle), tolerance,
+                   options.equilibrium, options.cycle.shooting}),
+      std::move(beside)};
+  const std::vector<BranchEvent> hopf = hopf_points(study.beside);
+  study.branch.events.insert(study.branch.events.begin(), hopf.begin(), hopf.end());
+  return study;
 }
 
 Sensitivity run_sensitivity(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options)
@@ -146,8 +155,7 @@ Sweep run_scene_sweep(const Model& model, const Scene& scene, const ProgramOptio
                                                 "in the symmetric part of K as well: sweep one direction, and the "
                                                 "other one with matrices of its own");
   NearbyModels models(model, scene);
-  const auto model_at = [&](std::span<const double> values) { return models.at(numbers_of(scene.sweep->key, values)); };
-  return run_sweep({*scene.sweep, model_at, scene.modes, options.modes, options.equilibrium}, models.comm());
+  return run_sweep(sweep_problem(models, *scene.sweep, scene, options, "sweep"), models.comm());
 }
 
 Robustness run_robustness(const Model& model, const Scene& scene, const ProgramOptions& options)
@@ -155,10 +163,8 @@ Robustness run_robustness(const Model& model, const Scene& scene, const ProgramO
   SweepSettings points;
   for (const UncertainNumber& number : scene.uncertain) points.key.push_back(number.key);
   NearbyModels models(model, scene);
-  const auto model_at = [&](std::span<const double> values) { return models.at(numbers_of(points.key, values)); };
   return find_robustness(*scene.robustness, scene.uncertain,
-                         {points, model_at, scene.modes, options.modes, options.equilibrium, "robustness"},
-                         models.comm());
+                         sweep_problem(models, points, scene, options, "robustness"), models.comm());
 }
 
 } // namespace squeal

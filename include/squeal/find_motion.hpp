@@ -33,7 +33,7 @@ Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const
                           const ProgramOptions& options);
 
 /// The cycle's branch over a number of the scene.
-BrakeBranch run_branch(const SlidingPoint& point, const Motion& motion, const Scene& scene,
+BranchStudy run_branch(const SlidingPoint& point, const Motion& motion, const Scene& scene,
                        const ProgramOptions& options);
 
 /// Derivatives of the unstable modes, and the effect of changes of the scene on them.

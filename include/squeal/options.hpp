@@ -2,9 +2,9 @@
 /// All options of squeal in one table, read and refused together; and the prefixes by which PETSc's, SLEPc's and
 /// MUMPS's objects take theirs.
 #include "squeal/algebra/bordered_factor.hpp"
+#include "squeal/arguments.hpp"
 #include "squeal/cycle/limit_cycle.hpp"
 #include "squeal/report/report.hpp"
-#include "squeal/scene/described.hpp"
 #include "squeal/settled/motion.hpp"
 #include "squeal/study/response.hpp"
 #include "squeal/transient/transient.hpp"
@@ -21,11 +21,8 @@ struct ProgramOptions
   StepOptions step; // of the transient and of the cycle
   CycleOptions cycle;
   SettledOptions settled;
-  bool force = false;               // --force: run whatever the forecast says
-  bool resolve = false;             // --resolve: a dry run prints the scene
-  TableLength length{};             // --verbose: full
-  std::string program{}, command{}; // by which the program was called
   ResponseOptions response;
+  Arguments arguments; // by which the program was called
 };
 
 /// The options of squeal's own, bound to their members, whose initialisers are the defaults.

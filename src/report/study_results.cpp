@@ -30,9 +30,10 @@ void add_branch_point(Entry out, const BranchPoint& point)
   const auto& values = point.multipliers.values;
   const double largest = values.empty() ? std::nan("") : std::abs(values.front());
   out.show("parameter", "unit of the key", "value of the number", point.parameter);
-  out.add("period", "s", "period of the cycle", point.period);
-  out.show("frequency_hz", "Hz", "its frequency", 1 / point.period);
-  out.add("residual", "-", "in the full space: up to ten tolerances where the period's map jumps", point.residual);
+  out.add("period", "s", "period of the cycle", point.orbit.period);
+  out.show("frequency_hz", "Hz", "its frequency", 1 / point.orbit.period);
+  out.add("residual", "-", "in the full space: up to ten tolerances where the period's map jumps",
+          point.orbit.residual);
   out.add("mean_energy", "J", "mean mechanical energy", measures.mean_energy);
   out.show("mean_fluctuating_energy", "J", "mean energy about equilibrium", measures.mean_fluctuating_energy);
   out.add("open_pairs_mean", "-", "mean number of open pairs", measures.open_pairs_mean);
@@ -55,12 +56,14 @@ void add_event(Entry out, const BranchEvent& event)
   out.show("change", "-", "change of unstable modes, unstable multipliers or lift-offs", event.change);
 }
 
-void add_equilibrium_point(Entry out, const EquilibriumStability& equilibrium)
+void add_equilibrium_point(Entry out, const SweepPoint& point)
 {
-  out.add("parameter", "unit of the key", "value of the number", equilibrium.parameter);
-  out.add("unstable_modes", "-", "unstable modes of the equilibrium", equilibrium.unstable_modes);
-  out.add("growth_rate", "1/s", "growth rate of its least stable mode", equilibrium.growth_rate);
-  out.add("frequency_hz", "Hz", "frequency of that mode", equilibrium.frequency_hz);
+  const auto least = std::ranges::find_if(point.modes, [](const SweptMode& mode) { return mode.lambda.imag() > 0; });
+  const std::complex<double> lambda = least == point.modes.end() ? 0 : least->lambda;
+  out.add("parameter", "unit of the key", "value of the number", point.values.empty() ? 0 : point.values[0]);
+  out.add("unstable_modes", "-", "unstable modes of the equilibrium", point.unstable);
+  out.add("growth_rate", "1/s", "growth rate of its least stable mode", lambda.real());
+  out.add("frequency_hz", "Hz", "frequency of that mode", frequency_hz_of(lambda));
 }
 
 /// An eigenvalue as growth rate and frequency.
@@ -179,9 +182,8 @@ void add_response(Entry out, const Report& report)
 
 void add_branch(Entry out, const Report& report)
 {
-  const BrakeBranch& found = report.branch;
   const BranchSettings& settings = *out.scene().branch;
-  const Branch& branch = found.branch;
+  const Branch& branch = report.branch.branch;
   add_key(out, "number that changes along the branch", settings.key);
   out.brief("from", "unit of the key", "one end of its range", settings.from);
   out.brief("to", "unit of the key", "the other end", settings.to);
@@ -192,8 +194,8 @@ void add_branch(Entry out, const Report& report)
   ends.show("forward", "why the side towards larger values ended", branch.ends.forward);
   out.list("points", add_branch_point, branch.points);
   out.list("events", add_event, branch.events);
-  std::vector<EquilibriumStability> known = found.equilibria;
-  std::erase_if(known, [](const EquilibriumStability& equilibrium) { return !equilibrium.known; });
+  std::vector<SweepPoint> known = report.branch.beside.points;
+  std::erase_if(known, [](const SweepPoint& point) { return point.outcome.kind != OutcomeKind::converged; });
   out.list("equilibria", add_equilibrium_point, known);
 }
 

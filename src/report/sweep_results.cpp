@@ -39,7 +39,7 @@ std::vector<Track> unstable_tracks(const Sweep& sweep)
       track.unstable += is_unstable(mode.lambda);
       track.least_mac = std::min(track.least_mac, mode.mac);
       if (track.points++ > 0 && track.mode.lambda.real() >= mode.lambda.real()) continue;
-      track.place = {point.values, point.reversed};
+      track.place = point;
       track.mode = mode;
     }
   std::vector<Track> unstable;
@@ -66,7 +66,7 @@ void add_line_place(Entry out, const SweptPlace& place)
 
 void add_point(Entry out, const SweepPoint& point)
 {
-  add_place(out, "value of each number", {point.values, point.reversed});
+  add_place(out, "value of each number", point);
   out.add("outcome", "word", "`converged`, or how the point failed", word(point.outcome.kind));
   out.text("reason", "why it failed", point.outcome.reason);
   out.add("inserted", "switch", "between the scene's points, where pairs or modes change much", point.inserted);
@@ -93,8 +93,7 @@ void add_track(Entry out, const Track& track)
 
 void add_threshold(Entry out, const Threshold& threshold)
 {
-  add_place(out, "where a mode becomes unstable or stable along the first number",
-            {threshold.values, threshold.reversed});
+  add_place(out, "where a mode becomes unstable or stable along the first number", threshold);
   out.show("error", "unit of the key", "length of the interval that holds the first value", threshold.error);
   out.show("track", "-", "number of the mode", threshold.track);
   out.brief("frequency_hz", "Hz", "its frequency there", threshold.frequency_hz);
@@ -104,7 +103,7 @@ void add_threshold(Entry out, const Threshold& threshold)
 /// A mode of a point; null: the point has none.
 void add_mode(Entry out, const SweepPoint& point, const SweptMode* mode)
 {
-  add_line_place(out, {point.values, point.reversed});
+  add_line_place(out, point);
   out.add("inserted", "switch", "as `sweep.points[].inserted`", point.inserted);
   out.add("outcome", "word", "as `sweep.points[].outcome`", word(point.outcome.kind));
   out.add("closed_pairs", "-", "closed pairs", point.closed);

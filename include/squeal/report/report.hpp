@@ -85,6 +85,12 @@ struct BoltResult
   double shortening = 0; // [m] of its shank
 };
 
+/// A branch, and the stability of sliding along its range.
+struct BranchStudy : BrakeBranch // its events include those of sliding
+{
+  Sweep beside; // by rising parameter
+};
+
 /// Each result is written once, and no stage reads it here. A stage that did not run has the outcome "off" (by the
 /// scene) or "skipped", with the reason.
 struct Report
@@ -105,7 +111,7 @@ struct Report
   Trajectory transient;
   Motion motion;
   Attractors attractors;
-  BrakeBranch branch;
+  BranchStudy branch;
   Sensitivity sensitivity;
   Sweep sweep;
   std::vector<Timing> timings; // in order
