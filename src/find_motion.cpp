@@ -156,10 +156,9 @@ double energy_along(const ComplexMode& mode, const Structure& structure, Vec mom
 FollowedMode mode_of_start(const SlidingPoint& point, const State& start)
 {
   const Structure& structure = point.model->structure;
-  const Owned<Vec> moved = copy_of(start.u.get()), momentum = zeros_like(start.v), force = zeros_like(start.v);
+  const Owned<Vec> moved = copy_of(start.u.get());
   check(VecAXPY(moved, -1, point.equilibrium.u));
-  check(MatMult(structure.M, start.v, momentum));
-  check(MatMult(structure.K, moved, force));
+  const Owned<Vec> momentum = product(structure.M, start.v), force = product(structure.K, moved);
   std::vector<double> energies;
   for (const ComplexMode& mode : point.modes.modes)
     energies.push_back(mode.frequency_hz() > 0 ? energy_along(mode, structure, momentum, force) : 0);

@@ -80,11 +80,9 @@ Sizes sizes_of(const Model& model, const FactorOptions& options)
 {
   Sizes sizes;
   const Mat K = model.structure.K;
-  PetscInt dofs = 0;
   MatInfo info;
-  check(MatGetSize(K, &dofs, nullptr));
   check(MatGetInfo(K, MAT_GLOBAL_SUM, &info)); // info.memory is 0 in most builds
-  sizes.dofs = static_cast<double>(dofs);
+  sizes.dofs = row_count(K);
   sizes.entries = info.nz_used;
   sizes.pairs = model.interface.pairs;
   sizes.ranks = ranks_of(comm_of(K));

@@ -55,8 +55,7 @@ public:
     const std::vector<double> q = all_entries(x);
     Owned<Vec> result = zeros_like(fine_.structure.load);
     const DofMap& dofs = fine_.dofs;
-    PetscInt first = 0, last = 0;
-    check(VecGetOwnershipRange(result, &first, &last));
+    const auto [first, last] = own_range(result);
     for (PetscInt i = first; i < last; ++i)
     {
       const PetscInt nodal = dofs.names.nodal_dof[static_cast<std::size_t>(i)];
@@ -175,7 +174,7 @@ std::vector<FinerMode> find_finer(std::span<const ComplexMode* const> modes, con
 MeshError on_finer_model(const SlidingPoint& point, const Model& fine, const ProgramOptions& options)
 {
   MeshError result;
-  check(VecGetSize(fine.structure.load, &result.dofs));
+  result.dofs = entry_count(fine.structure.load);
   result.outcome = {OutcomeKind::not_converged, "no equilibrium was found on the finer mesh", 0, 0};
   Equilibrium equilibrium = find_equilibrium(fine.structure, fine.interface, options.equilibrium);
   if (equilibrium.outcome.kind != OutcomeKind::converged) return result;

@@ -147,7 +147,7 @@ std::vector<PartMass> masses_of(const Mesh& mesh, const Scene& scene)
 ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm)
 {
   ModelSummary summary;
-  check(MatGetSize(model.structure.K, &summary.dofs, nullptr));
+  summary.dofs = row_count(model.structure.K);
   summary.elements = model.structure.elements;
   summary.pairs = model.interface.pairs;
   summary.coverage = model.coverage;
@@ -161,10 +161,8 @@ ModelSummary summary_of(const Model& model, const Scene& scene, MPI_Comm comm)
     summary.parts = masses_of(model.mesh, scene);
   };
   on_rank_zero(comm, look);
-  double stiffness = 0, mass = 0;
-  check(MatNorm(model.structure.K, NORM_1, &stiffness));
-  check(MatNorm(model.structure.M, NORM_1, &mass));
-  if (mass > 0) summary.rounding_hz = 1e-6 * std::sqrt(stiffness / mass) / two_pi;
+  if (const double mass = norm_of(model.structure.M, NORM_1); mass > 0)
+    summary.rounding_hz = 1e-6 * std::sqrt(norm_of(model.structure.K, NORM_1) / mass) / two_pi;
   return summary;
 }
 

@@ -37,9 +37,7 @@ namespace
 /// B may be null.
 int rows_of(Mat B)
 {
-  PetscInt rows = 0;
-  if (B) check(MatGetSize(B, &rows, nullptr));
-  return to_int(rows);
+  return B ? to_int(row_count(B)) : 0;
 }
 
 /// This rank's share of the lower triangle of A and of B below it.

@@ -76,25 +76,20 @@ double pseudo_random(std::uint64_t seed)
 
 MultiVector empty_multivector(Mat A)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRangeColumn(A, &first, &last));
-  return {comm_of(A), MatrixXd(last - first, 0)};
+  return {comm_of(A), MatrixXd(own_columns(A).size(), 0)};
 }
 
 MultiVector random_multivector(Mat A, PetscInt columns)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRangeColumn(A, &first, &last));
+  const IndexRange own = own_columns(A);
   const auto entry = [&](Index i, Index j)
-  { return pseudo_random(0x9e3779b97f4a7c15u * static_cast<std::uint64_t>((first + i) * columns + j + 1)); };
-  return {comm_of(A), MatrixXd::NullaryExpr(last - first, columns, entry)};
+  { return pseudo_random(0x9e3779b97f4a7c15u * static_cast<std::uint64_t>((own.first + i) * columns + j + 1)); };
+  return {comm_of(A), MatrixXd::NullaryExpr(own.size(), columns, entry)};
 }
 
 MultiVector columns_of(std::span<const Vec> x)
 {
-  PetscInt rows = 0;
-  check(VecGetLocalSize(x[0], &rows));
-  MultiVector X{comm_of(x[0]), MatrixXd(rows, x.size())};
+  MultiVector X{comm_of(x[0]), MatrixXd(own_range(x[0]).size(), x.size())};
   for (Index j = 0; j < X.columns(); ++j) set_column(X, j, x[static_cast<std::size_t>(j)]);
   return X;
 }
@@ -121,9 +116,7 @@ void copy_column(const MultiVector& X, Index j, Vec x)
 
 MultiVector product(Mat A, const MultiVector& X)
 {
-  PetscInt rows = 0;
-  check(MatGetLocalSize(A, &rows, nullptr));
-  MultiVector Y{X.comm, MatrixXd(rows, X.columns())};
+  MultiVector Y{X.comm, MatrixXd(own_rows(A).size(), X.columns())};
   if (X.columns() <= 2 || !is_sparse(A))
   {
     multiply_few(A, X, Y);
@@ -135,12 +128,9 @@ MultiVector product(Mat A, const MultiVector& X)
 
 MatrixXd whole_product(Mat A, const MultiVector& X)
 {
-  PetscInt rows = 0, first = 0;
-  check(MatGetSize(A, &rows, nullptr));
-  check(MatGetOwnershipRange(A, &first, nullptr));
   const MultiVector own = product(A, X);
-  MatrixXd whole = MatrixXd::Zero(rows, X.columns());
-  whole.middleRows(first, own.entries.rows()) = own.entries;
+  MatrixXd whole = MatrixXd::Zero(row_count(A), X.columns());
+  whole.middleRows(own_rows(A).first, own.entries.rows()) = own.entries;
   add_up(whole, X.comm);
   return whole;
 }

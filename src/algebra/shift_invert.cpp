@@ -140,8 +140,7 @@ void move_to(ShiftInvert& pencil, double shift)
 
 Nearest solve_nearest(const ShiftInvert& pencil, PetscInt count, double radius, double tolerance, double guards)
 {
-  PetscInt n = 0;
-  check(MatGetSize(pencil.K, &n, nullptr));
+  const PetscInt n = row_count(pencil.K);
   Krylov krylov{empty_multivector(pencil.K)};
   extend_orthonormal(krylov.V, random_multivector(pencil.K, std::min(n, block_size)));
   const PetscInt limit = std::max(largest_space, 4 * count);

@@ -191,15 +191,13 @@ class Swarm
 {
 public:
   Swarm(const AttractorProblem& problem, int steps_per_period, std::vector<State> starts)
-      : problem_(problem), steps_per_period_(steps_per_period), rest_force_(zeros_like(problem.sliding.equilibrium.u)),
-        states_(std::move(starts)), watched_(states_.size())
+      : problem_(problem), steps_per_period_(steps_per_period), states_(std::move(starts)), watched_(states_.size())
   {
     const auto& [structure, interface, equilibrium] = problem.sliding;
     const double period = 1 / problem.unstable.modes.front().frequency_hz();
     step_ = make_theta_step(structure, interface, period / steps_per_period_, problem.settings.theta, problem.step);
-    check(MatMult(structure.K, equilibrium.u, rest_force_));
-    check(VecDot(rest_force_, equilibrium.u, &rest_energy_));
-    rest_energy_ /= 2;
+    rest_force_ = product(structure.K, equilibrium.u);
+    rest_energy_ = dot(rest_force_, equilibrium.u) / 2;
     for (std::size_t i = 0; i < std::min(coordinates, problem.modes.size()); ++i)
       shapes_.push_back(problem.modes[i].real);
     for (State& state : states_) works_.push_back(begin_steps(step_, structure, interface, state));
@@ -251,9 +249,7 @@ private:
   {
     Watched& watched = watched_[k];
     const double h = step_.h;
-    double work = 0;
-    check(VecDot(rest_force_, states_[k].u, &work));
-    watched.energies.push_back(report.energy - work + rest_energy_);
+    watched.energies.push_back(report.energy - dot(rest_force_, states_[k].u) + rest_energy_);
     std::array<double, coordinates> now{};
     check(VecMDot(works_[k].Mv, static_cast<PetscInt>(shapes_.size()), shapes_.data(), now.data()));
     for (std::size_t i = 0; i < shapes_.size(); ++i)

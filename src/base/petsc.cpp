@@ -115,6 +115,76 @@ Owned<Vec> vector_of_rows(Mat A)
   return vector_on(rows, comm_of(A));
 }
 
+Owned<Vec> product(Mat A, Vec x)
+{
+  Owned<Vec> result = vector_of_rows(A);
+  check(MatMult(A, x, result));
+  return result;
+}
+
+double dot(Vec x, Vec y)
+{
+  double product = 0;
+  check(VecDot(x, y, &product));
+  return product;
+}
+
+double norm_of(Vec x, NormType type)
+{
+  double norm = 0;
+  check(VecNorm(x, type, &norm));
+  return norm;
+}
+
+double norm_of(Mat A, NormType type)
+{
+  double norm = 0;
+  check(MatNorm(A, type, &norm));
+  return norm;
+}
+
+PetscInt entry_count(Vec x)
+{
+  PetscInt count = 0;
+  check(VecGetSize(x, &count));
+  return count;
+}
+
+PetscInt row_count(Mat A)
+{
+  PetscInt count = 0;
+  check(MatGetSize(A, &count, nullptr));
+  return count;
+}
+
+PetscInt column_count(Mat A)
+{
+  PetscInt count = 0;
+  check(MatGetSize(A, nullptr, &count));
+  return count;
+}
+
+IndexRange own_range(Vec x)
+{
+  IndexRange range;
+  check(VecGetOwnershipRange(x, &range.first, &range.last));
+  return range;
+}
+
+IndexRange own_rows(Mat A)
+{
+  IndexRange range;
+  check(MatGetOwnershipRange(A, &range.first, &range.last));
+  return range;
+}
+
+IndexRange own_columns(Mat A)
+{
+  IndexRange range;
+  check(MatGetOwnershipRangeColumn(A, &range.first, &range.last));
+  return range;
+}
+
 Owned<Mat> transpose_of(Mat A)
 {
   Owned<Mat> result;
@@ -151,8 +221,7 @@ std::vector<double> all_entries(Vec x)
 
 void set_all_entries(Vec x, std::span<const double> entries)
 {
-  PetscInt first = 0, last = 0;
-  check(VecGetOwnershipRange(x, &first, &last));
+  const auto [first, last] = own_range(x);
   PetscScalar* own = nullptr;
   check(VecGetArrayWrite(x, &own));
   std::copy(entries.begin() + first, entries.begin() + last, own);

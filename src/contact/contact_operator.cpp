@@ -264,10 +264,8 @@ namespace
 /// Entries that are all different, the same for any number of ranks: a start for inverse iteration.
 Owned<Vec> uneven_vector(Mat A)
 {
-  Owned<Vec> x;
-  check(MatCreateVecs(A, x.put(), nullptr));
-  PetscInt first = 0, last = 0;
-  check(VecGetOwnershipRange(x, &first, &last));
+  Owned<Vec> x = vector_of_columns(A);
+  const auto [first, last] = own_range(x);
   for (PetscInt i = first; i < last; ++i)
     check(VecSetValue(x, i, 1 + 0.5 * std::sin(7. * static_cast<double>(i) + 1), INSERT_VALUES));
   check(VecAssemblyBegin(x));
@@ -282,16 +280,13 @@ double least_resistance(const Factor& factor, Vec D, Vec x)
   double quotient = 1;
   for (int iteration = 0; iteration < 3; ++iteration)
   {
-    double size = 0, work = 0, weight = 0;
-    check(VecNorm(x, NORM_INFINITY, &size));
+    const double size = norm_of(x, NORM_INFINITY);
     if (!std::isfinite(size) || size == 0) return 0;
     check(VecScale(x, 1 / size));
     check(VecPointwiseMult(load, D, x));
     solve(factor, load, x);
     check(VecPointwiseMult(scaled, D, x));
-    check(VecDot(x, load, &work));
-    check(VecDot(x, scaled, &weight));
-    quotient = work / weight;
+    quotient = dot(x, load) / dot(x, scaled);
   }
   return quotient;
 }
@@ -311,12 +306,12 @@ PetscInt row_of_largest_entry(Vec x)
 /// matrix does not factor either, A is indefinite.
 void find_loose(Mat A, Vec D, const FactorOptions& options, Factored& result)
 {
-  double largest = 0, part = 1e-8;
-  check(VecNorm(D, NORM_INFINITY, &largest));
+  const double largest = norm_of(D, NORM_INFINITY);
   const auto x = uneven_vector(A);
   const auto uniform = zeros_like(D);
   check(VecSet(uniform, 1));
-  for (bool failed = true; failed && part < 100; part *= 10)
+  bool failed = true;
+  for (double part = 1e-8; failed && part < 100; part *= 10)
   {
     const Owned<Mat> shifted = copy_of(A);
     check(MatShift(shifted, largest > 0 ? part * largest : 1));
@@ -335,8 +330,7 @@ Factored factor_positive(Mat A, const Interface& interface, const FactorOptions&
   Factored result;
   Mat B = interface.pairs > 0 ? interface.B.get() : nullptr;
   result.factor = Factor(A, B, options);
-  Owned<Vec> D;
-  check(MatCreateVecs(A, D.put(), nullptr));
+  const Owned<Vec> D = vector_of_columns(A);
   check(MatGetDiagonal(A, D));
   if (result.factor.failed())
   {

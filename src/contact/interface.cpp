@@ -197,18 +197,14 @@ Interface read_interface(const std::filesystem::path& folder, const Structure& s
   interface.friction = friction;
   if (has_no_pairs(folder, comm))
   {
-    PetscInt own = 0;
-    check(MatGetLocalSize(structure.M, &own, nullptr));
-    interface.B = matrix_of_rows({}, own, comm);
+    interface.B = matrix_of_rows({}, own_rows(structure.M).size(), comm);
     return interface;
   }
   interface.gap = read_vector(folder / "gap.petsc", comm);
   interface.drive = read_vector(folder / "drive.petsc", comm);
   interface.pairs = static_cast<int>(interface.gap.size());
   const auto size = check_matrix_file(folder / "B.petsc", comm);
-  PetscInt dofs = 0, local_dofs = 0;
-  check(MatGetSize(structure.M, &dofs, nullptr));
-  check(MatGetLocalSize(structure.M, &local_dofs, nullptr));
+  const PetscInt dofs = row_count(structure.M);
   const std::string B = (folder / "B.petsc").string();
   if (size.columns != dofs)
     throw Error(B + ": " + std::to_string(size.columns) + " columns, but M.petsc has " + std::to_string(dofs));
@@ -223,8 +219,8 @@ Interface read_interface(const std::filesystem::path& folder, const Structure& s
                 " tangential row(s) each in B.petsc");
   read_compliance(folder / "compliance.petsc", interface, comm);
   const auto [first, last] = local_range(interface.pairs, comm);
-  interface.B =
-      load_matrix(B, size, {PairRows<PetscInt>(interface.directions).rows_of(last - first), local_dofs}, comm);
+  interface.B = load_matrix(
+      B, size, {PairRows<PetscInt>(interface.directions).rows_of(last - first), own_rows(structure.M).size()}, comm);
   check_interface(interface, folder.string(), comm);
   return interface;
 }
@@ -238,15 +234,13 @@ std::vector<std::vector<double>> relative(const Interface& interface, std::span<
 {
   const Owned<Vec> rows = vector_of_rows(interface.B);
   const RowLayout layout = row_layout(interface.B);
-  PetscInt first = 0, last = 0;
-  check(VecGetOwnershipRange(rows, &first, &last));
   std::vector<double> own; // entries of one vector after the other
   for (const Vec vector : x)
   {
     check(MatMult(interface.B, vector, rows));
     const PetscScalar* entries = nullptr;
     check(VecGetArrayRead(rows, &entries));
-    own.insert(own.end(), entries, entries + (last - first));
+    own.insert(own.end(), entries, entries + own_rows(interface.B).size());
     check(VecRestoreArrayRead(rows, &entries));
   }
   std::vector<double> whole(static_cast<std::size_t>(layout.total()) * x.size());
@@ -365,18 +359,16 @@ std::vector<double> drive_friction(const Interface& interface)
 Owned<Mat> rows_of(const Interface& interface, const std::vector<int>& pairs, RowsTaken taken)
 {
   const PairRows<PetscInt> rows_of_pairs(interface.directions);
-  PetscInt first = 0, last = 0, first_dof = 0, last_dof = 0;
-  check(MatGetOwnershipRange(interface.B, &first, &last));
-  check(MatGetOwnershipRangeColumn(interface.B, &first_dof, &last_dof));
+  const IndexRange own = own_rows(interface.B), dofs = own_columns(interface.B);
   const PetscInt count = taken == RowsTaken::all ? rows_of_pairs.per_pair() : 1;
   std::vector<PetscInt> mine;
   for (const int pair : pairs)
     for (PetscInt k = 0; k < count; ++k)
-      if (const PetscInt row = rows_of_pairs.normal(pair) + k; row >= first && row < last) mine.push_back(row);
+      if (const PetscInt row = rows_of_pairs.normal(pair) + k; own.holds(row)) mine.push_back(row);
   const MPI_Comm comm = comm_of(interface.B);
   Owned<IS> rows, columns;
   check(ISCreateGeneral(comm, static_cast<PetscInt>(mine.size()), mine.data(), PETSC_COPY_VALUES, rows.put()));
-  check(ISCreateStride(comm, last_dof - first_dof, first_dof, 1, columns.put()));
+  check(ISCreateStride(comm, dofs.size(), dofs.first, 1, columns.put()));
   Owned<Mat> result;
   check(MatCreateSubMatrix(interface.B, rows, columns, MAT_INITIAL_MATRIX, result.put()));
   return result;

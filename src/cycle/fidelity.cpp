@@ -84,10 +84,6 @@ std::string try_reduced_model(CycleProblem& problem, const CycleOptions& options
   {
     return find_by_reduced_model(problem, options, found);
   }
-  catch (const LibraryError&) // perhaps on this rank alone
-  {
-    throw;
-  }
   catch (const Error& error) // on every rank alike: the reduced model is the same on all
   {
     if (found.fidelity.asked == CycleModel::reduced) throw;

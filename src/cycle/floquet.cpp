@@ -150,9 +150,7 @@ RealModes modes_beyond_band(const CycleProblem& problem)
 /// Why a model of so many shapes is not made; empty: it fits the free memory.
 std::string lack_of_memory(const Structure& structure, Index shapes)
 {
-  PetscInt dofs = 0;
-  check(VecGetSize(structure.load, &dofs));
-  const double needed = memory_of_reduction(dofs, static_cast<double>(shapes)),
+  const double needed = memory_of_reduction(entry_count(structure.load), static_cast<double>(shapes)),
                free = free_memory(comm_of(structure.load));
   if (needed <= free) return {};
   return format("a reduced model of %ld shapes takes %.3g GB, and %.3g GB are free: a larger machine would decide",
@@ -307,10 +305,6 @@ void make(CycleProblem& problem, PeriodMap& map, RecordedInverse& inverse)
     inverse.correction = monodromy_correction(model, monodromy(own, period, contacts), flow);
     inverse.apply = preconditioner_of(inverse.correction, coordinates_in(model, problem.sliding.structure));
     problem.reduced = inverse.model;
-  }
-  catch (const LibraryError&) // perhaps on this rank alone
-  {
-    throw;
   }
   catch (const Error&) // on every rank alike: none can be made
   {

@@ -27,11 +27,8 @@ bool is_near(Vec start, Vec end)
 {
   constexpr double near = 0.01;
   const Owned<Vec> moved = copy_of(velocity(end));
-  double first = 0, by = 0;
   check(VecAXPY(moved, -1, velocity(start)));
-  check(VecNorm(velocity(start), NORM_2, &first));
-  check(VecNorm(moved, NORM_2, &by));
-  return by <= near * first;
+  return norm_of(moved, NORM_2) <= near * norm_of(velocity(start), NORM_2);
 }
 
 void describe_orbit(Checkpoint& checkpoint, const Structure& structure, const std::array<Vec, 2>& state, double& period)

@@ -83,15 +83,12 @@ void end_at_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate, 
   const double h = map.step.h;
   const Owned<Vec> difference = copy_of(next);
   check(VecAXPBYPCZ(difference, -1, -h, 1, velocity(end), velocity(rate)));
-  double bend = 0, speed = 0, moved = 0, first = 0;
-  check(VecNorm(difference, NORM_2, &bend));
-  check(VecNorm(velocity(end), NORM_2, &speed));
+  const double bend = norm_of(difference, NORM_2), speed = norm_of(velocity(end), NORM_2);
   check(VecAXPY(displacement(end), period - map.steps * h, displacement(rate)));
   check(VecAXPY(velocity(end), period - map.steps * h, velocity(rate)));
   check(VecWAXPY(difference, -1, velocity(start), velocity(end)));
-  check(VecNorm(difference, NORM_2, &moved));
-  check(VecNorm(velocity(start), NORM_2, &first));
-  map.kept = {h, 2 * bend / (h * h * speed), moved / first};
+  const double moved = norm_of(difference, NORM_2) / norm_of(velocity(start), NORM_2);
+  map.kept = {h, 2 * bend / (h * h * speed), moved};
 }
 
 void integrate_once(PeriodMap& map, double period, Vec start, Vec end, Vec rate)

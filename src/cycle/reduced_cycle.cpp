@@ -171,8 +171,7 @@ ReducedCycle shoot_at(ReducedSearch& search, ReducedMap& map, const ReducedState
 std::string size_refusal(const ReducedSearch& search)
 {
   const CycleProblem& problem = search.problem;
-  PetscInt dofs = 0;
-  check(VecGetSize(problem.sliding.structure.load, &dofs));
+  const PetscInt dofs = entry_count(problem.sliding.structure.load);
   const std::size_t rows = PairRows<std::size_t>(problem.sliding.interface.directions).rows_of(search.active.size());
   const std::size_t shapes = std::min(problem.modes.size(), static_cast<std::size_t>(search.options.reduced_modes)) +
                              std::min(rows, static_cast<std::size_t>(attachments_of(search)));

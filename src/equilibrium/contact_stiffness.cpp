@@ -12,16 +12,15 @@ template <class AddPair>
 Owned<Mat> on_pair_rows(const Interface& interface, const std::vector<char>& closed, PetscInt width, AddPair add_pair)
 {
   const PairRows<PetscInt> rows(interface.directions);
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(interface.B, &first, &last));
+  const IndexRange own = own_rows(interface.B);
   Owned<Mat> result; // a pair may straddle ranks
-  check(MatCreateAIJ(comm_of(interface.B), last - first, last - first, PETSC_DETERMINE, PETSC_DETERMINE, width, nullptr,
+  check(MatCreateAIJ(comm_of(interface.B), own.size(), own.size(), PETSC_DETERMINE, PETSC_DETERMINE, width, nullptr,
                      width, nullptr, result.put()));
   bool any = false; // alike on every rank
   const auto set = [&](PetscInt row, PetscInt column, double value)
   {
     any = any || value != 0;
-    if (value != 0 && row >= first && row < last) check(MatSetValue(result, row, column, value, INSERT_VALUES));
+    if (value != 0 && own.holds(row)) check(MatSetValue(result, row, column, value, INSERT_VALUES));
   };
   for (std::size_t i = 0; i < closed.size(); ++i)
     if (closed[i]) add_pair(i, rows.normal(static_cast<PetscInt>(i)), set);
@@ -87,12 +86,10 @@ Owned<Mat> compliant_reactions(const Interface& interface, const std::vector<cha
 {
   const PairRows<PetscInt> rows(interface.directions);
   if (interface.compliance.empty()) return {};
-  PetscInt own_rows = 0, first = 0, last = 0;
-  check(MatGetLocalSize(interface.B, &own_rows, nullptr));
   Owned<Mat> choice, result;
-  check(MatCreateAIJ(comm_of(interface.B), PETSC_DECIDE, own_rows, interface.pairs, PETSC_DETERMINE, 1, nullptr, 1,
-                     nullptr, choice.put()));
-  check(MatGetOwnershipRange(choice, &first, &last));
+  check(MatCreateAIJ(comm_of(interface.B), PETSC_DECIDE, own_rows(interface.B).size(), interface.pairs, PETSC_DETERMINE,
+                     1, nullptr, 1, nullptr, choice.put()));
+  const auto [first, last] = own_rows(choice);
   for (PetscInt pair = first; pair < last; ++pair)
   {
     const auto i = static_cast<std::size_t>(pair);

@@ -14,9 +14,7 @@ namespace
 /// What nothing touches and nothing loads stays where it is, held or free: the modes of a free body need no support.
 bool stays_at_rest(const Structure& structure, const Interface& interface)
 {
-  double load = 0;
-  check(VecNorm(structure.load, NORM_INFINITY, &load));
-  return interface.pairs == 0 && load == 0;
+  return interface.pairs == 0 && norm_of(structure.load, NORM_INFINITY) == 0;
 }
 
 } // namespace

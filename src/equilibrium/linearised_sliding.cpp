@@ -70,8 +70,7 @@ std::vector<Row> read_rows(const Interface& interface, const std::vector<HeldRow
   std::ranges::sort(sources, {}, &Source::row); // as PETSc needs them
   std::vector<PetscInt> indices;
   for (const Source& source : sources) indices.push_back(source.row);
-  PetscInt dofs = 0;
-  check(MatGetSize(interface.B, nullptr, &dofs));
+  const PetscInt dofs = column_count(interface.B);
   Owned<IS> row_set, column_set;
   check(ISCreateGeneral(PETSC_COMM_SELF, static_cast<PetscInt>(indices.size()), indices.data(), PETSC_COPY_VALUES,
                         row_set.put()));
@@ -230,8 +229,7 @@ void basis_row(const Elimination& elimination, PetscInt dof, double Coefficients
 
 Owned<Mat> assemble_basis(const Elimination& elimination, double Coefficients::*kind, Mat pattern)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(pattern, &first, &last));
+  const auto [first, last] = own_rows(pattern);
   const PetscInt first_column = elimination.kept_before(first), last_column = elimination.kept_before(last);
   std::vector<PetscInt> columns, inside, outside;
   std::vector<double> values;
@@ -270,17 +268,16 @@ Owned<Mat> assemble_reaction(const Elimination& elimination, double Coefficients
 {
   const std::vector<Row>& rows = elimination.rows;
   const bool normal = wanted == ReactionRows::normal;
-  PetscInt first = 0, last = 0, dofs = 0;
-  check(MatGetOwnershipRangeColumn(interface.B, &first, &last));
-  check(MatGetSize(interface.B, nullptr, &dofs));
+  const IndexRange own = own_columns(interface.B);
+  const PetscInt dofs = column_count(interface.B);
   Owned<Mat> result;
   check(MatCreate(comm_of(interface.B), result.put()));
-  check(MatSetSizes(result, PETSC_DECIDE, last - first, interface.pairs * (normal ? 1 : interface.directions), dofs));
+  check(MatSetSizes(result, PETSC_DECIDE, own.size(), interface.pairs * (normal ? 1 : interface.directions), dofs));
   check(MatSetType(result, MATAIJ));
   check(MatSetUp(result));
   check(MatSetOption(result, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE)); // rows that share pivots fill in
   for (const auto& [pivot, i] : elimination.row_of)
-    for (auto entry = rows[i].lower_bound(dofs); pivot >= first && pivot < last && entry != rows[i].end(); ++entry)
+    for (auto entry = rows[i].lower_bound(dofs); own.holds(pivot) && entry != rows[i].end(); ++entry)
     {
       const auto [pair, component] = held[static_cast<std::size_t>(entry->first - dofs)];
       if ((component == 0) != normal) continue;
@@ -303,8 +300,7 @@ ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface
     if (component == 0) result.pairs.push_back(pair);
   std::ranges::sort(result.pairs);
   std::vector<Row> rows = read_rows(interface, held);
-  PetscInt dofs = 0;
-  check(MatGetSize(structure.K, &dofs, nullptr));
+  const PetscInt dofs = row_count(structure.K);
   const std::vector<PetscInt> pivots = eliminate(rows, held, interface, dofs);
   Elimination elimination{rows, {}, {}, dofs};
   for (std::size_t i = 0; i < pivots.size(); ++i)
@@ -357,9 +353,7 @@ Owned<Mat> project(Mat A, Mat Y, Mat Z)
 std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
                                                    Vec imaginary)
 {
-  Owned<Vec> re, im;
-  check(MatCreateVecs(reaction.K, nullptr, re.put()));
-  check(MatCreateVecs(reaction.K, nullptr, im.put()));
+  const Owned<Vec> re = vector_of_rows(reaction.K), im = vector_of_rows(reaction.K);
   quadratic_residual({reaction.M, reaction.C, reaction.K}, s, {real, imaginary}, {re, im});
   const std::vector<double> first = all_entries(re), second = all_entries(im);
   std::vector<std::complex<double>> result;

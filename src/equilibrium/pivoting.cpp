@@ -252,11 +252,9 @@ namespace
 /// Any kappa is exact; one of the size of the structure's own stiffness keeps the digits.
 double typical_stiffness(Mat K)
 {
-  Owned<Vec> diagonal;
-  check(MatCreateVecs(K, diagonal.put(), nullptr));
+  const Owned<Vec> diagonal = vector_of_columns(K);
   check(MatGetDiagonal(K, diagonal));
-  double largest = 0;
-  check(VecNorm(diagonal, NORM_INFINITY, &largest));
+  const double largest = norm_of(diagonal, NORM_INFINITY);
   return largest > 0 ? largest : 1;
 }
 
@@ -330,19 +328,15 @@ Held hold_by_all_rows(const Structure& structure, const Interface& interface, co
 
 bool balances(const Structure& structure, const Interface& interface, Equilibrium& equilibrium)
 {
-  const auto residual = zeros_like(structure.load);
-  double load = 0, stress = 0, defect = 0, stiffness = 0, motion = 0;
-  check(MatMult(structure.K, equilibrium.u, residual));
-  check(VecNorm(residual, NORM_2, &stress));
+  const Owned<Vec> residual = product(structure.K, equilibrium.u);
+  const double stress = norm_of(residual, NORM_2), load = norm_of(structure.load, NORM_2);
   check(VecScale(residual, -1));
   check(VecAXPY(residual, 1, structure.load));
   if (interface.pairs > 0) add_reactions(interface, equilibrium.reactions, residual);
-  check(VecNorm(residual, NORM_2, &defect));
-  check(VecNorm(structure.load, NORM_2, &load));
-  check(VecNorm(equilibrium.u, NORM_2, &motion));
-  check(MatNorm(structure.K, NORM_INFINITY, &stiffness));
+  const double defect = norm_of(residual, NORM_2),
+               largest = norm_of(structure.K, NORM_INFINITY) * norm_of(equilibrium.u, NORM_2);
   equilibrium.force_residual = defect == 0 ? 0 : defect / (load > 0 ? load : stress);
-  return equilibrium.force_residual <= 1e-9 || defect <= 4 * PETSC_MACHINE_EPSILON * stiffness * motion;
+  return equilibrium.force_residual <= 1e-9 || defect <= 4 * PETSC_MACHINE_EPSILON * largest;
 }
 
 PathOperators path_operators(const Structure& structure, const Interface& interface, const EquilibriumOptions& options)

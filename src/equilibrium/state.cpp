@@ -17,11 +17,7 @@ namespace
 
 double half_quadratic_form(Mat A, Vec x)
 {
-  Owned<Vec> Ax = zeros_like(x);
-  check(MatMult(A, x, Ax));
-  double product = 0;
-  check(VecDot(x, Ax, &product));
-  return product / 2;
+  return dot(x, product(A, x)) / 2;
 }
 
 /// What is wrong with a state file, before any rank opens it through PETSc; throws Error.
@@ -66,8 +62,7 @@ std::vector<double> next_vector(std::istream& stream)
 
 void require_finite(Vec x, const std::string& what)
 {
-  double norm = 0;
-  check(VecNorm(x, NORM_1, &norm)); // a sum keeps a NaN of any rank, a maximum may lose it
+  const double norm = norm_of(x, NORM_1); // a sum keeps a NaN of any rank, a maximum may lose it
   if (!std::isfinite(norm)) throw Error(what + " holds entries that are not finite");
 }
 
@@ -106,8 +101,7 @@ void write_state(const State& state, const Structure& structure, const std::file
 State read_state(const std::filesystem::path& file, const Structure& structure)
 {
   const MPI_Comm comm = comm_of(structure.load);
-  PetscInt size = 0;
-  check(VecGetSize(structure.load, &size));
+  const PetscInt size = entry_count(structure.load);
   std::vector<double> u, v, slip; // on rank 0
   on_rank_zero(comm,
                [&]
@@ -133,9 +127,7 @@ State read_state(const std::filesystem::path& file, const Structure& structure)
 FileOrder::FileOrder(const Structure& structure)
 {
   const Vec x = structure.load;
-  PetscInt size = 0;
-  check(VecGetSize(x, &size));
-  if (rank_of(comm_of(x)) != 0) size = 0;
+  const PetscInt size = rank_of(comm_of(x)) == 0 ? entry_count(x) : 0;
   std::vector<PetscInt> order(static_cast<std::size_t>(size));
   std::iota(order.begin(), order.end(), 0);
   const std::vector<PetscInt>& nodal_dof = structure.names.nodal_dof;
@@ -152,23 +144,16 @@ std::vector<double> FileOrder::gather(Vec x) const
 {
   check(VecScatterBegin(scatter_, x, whole_, INSERT_VALUES, SCATTER_FORWARD));
   check(VecScatterEnd(scatter_, x, whole_, INSERT_VALUES, SCATTER_FORWARD));
-  PetscInt size = 0;
   const PetscScalar* values = nullptr;
-  check(VecGetLocalSize(whole_, &size));
   check(VecGetArrayRead(whole_, &values));
-  std::vector<double> entries(values, values + size);
+  std::vector<double> entries(values, values + entry_count(whole_));
   check(VecRestoreArrayRead(whole_, &values));
   return entries;
 }
 
 void FileOrder::scatter(std::span<const double> entries, Vec x) const
 {
-  PetscInt size = 0; // 0 but on rank 0
-  PetscScalar* values = nullptr;
-  check(VecGetLocalSize(whole_, &size));
-  check(VecGetArrayWrite(whole_, &values));
-  std::copy_n(entries.begin(), size, values);
-  check(VecRestoreArrayWrite(whole_, &values));
+  set_all_entries(whole_, entries); // of which there are none but on rank 0
   check(VecScatterBegin(scatter_, whole_, x, INSERT_VALUES, SCATTER_REVERSE));
   check(VecScatterEnd(scatter_, whole_, x, INSERT_VALUES, SCATTER_REVERSE));
 }

@@ -138,8 +138,7 @@ void search_by_toar(const PairProblem& problem, double floor, const ModesOptions
 
 PairSearch search_pairs(const PairProblem& problem, ModesMethod method, double band, const ModesOptions& options)
 {
-  PetscInt n = 0;
-  check(MatGetSize(problem.K_z, &n, nullptr));
+  const PetscInt n = row_count(problem.K_z);
   const double floor = std::sqrt(vibration_floor(norms_of(problem.sliding)));
   const bool by_slices = n > options.dense_limit && method != ModesMethod::toar;
   PairSearch search = empty_search(two_pi * band * (by_slices ? reach_of_count : 1));
@@ -192,14 +191,13 @@ using Complex = std::complex<double>;
 /// The entry of phi with the largest modulus. Of nearly equal ones it is the first, for any number of ranks.
 std::complex<double> largest_component(Vec real, Vec imaginary)
 {
-  PetscInt first = 0, last = 0;
+  const PetscInt own_entries = own_range(real).size();
   const PetscScalar *re = nullptr, *im = nullptr;
-  check(VecGetOwnershipRange(real, &first, &last));
   check(VecGetArrayRead(real, &re));
   check(VecGetArrayRead(imaginary, &im));
   MPI_Comm comm = comm_of(real);
   double largest = 0;
-  for (PetscInt i = 0; i < last - first; ++i) largest = std::max(largest, std::hypot(re[i], im[i]));
+  for (PetscInt i = 0; i < own_entries; ++i) largest = std::max(largest, std::hypot(re[i], im[i]));
   MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, comm);
   struct
   {
@@ -207,7 +205,7 @@ std::complex<double> largest_component(Vec real, Vec imaginary)
     int rank = 0;
   } own;
   own.rank = ranks_of(comm);
-  for (PetscInt i = last - first - 1; i >= 0; --i)
+  for (PetscInt i = own_entries - 1; i >= 0; --i)
     if (std::hypot(re[i], im[i]) >= largest * (1 - 1e-6)) own = {{re[i], im[i]}, rank_of(comm)};
   check(VecRestoreArrayRead(real, &re));
   check(VecRestoreArrayRead(imaginary, &im));
@@ -220,10 +218,8 @@ std::complex<double> largest_component(Vec real, Vec imaginary)
 /// Sets phi = Z y, turned and scaled so that its largest entry is 1.
 void set_shape(ComplexMode& mode, const ClosedContact& contact, const Eigenpair& pair)
 {
-  check(MatCreateVecs(contact.Z, nullptr, mode.real.put()));
-  check(MatMult(contact.Z, pair.real, mode.real));
-  mode.imaginary = zeros_like(mode.real);
-  check(MatMult(contact.Z, pair.imaginary, mode.imaginary));
+  mode.real = product(contact.Z, pair.real);
+  mode.imaginary = product(contact.Z, pair.imaginary);
   const std::complex<double> turn = 1.0 / largest_component(mode.real, mode.imaginary);
   const Owned<Vec> real = copy_of(mode.real);
   check(VecAXPBY(mode.real, -turn.imag(), turn.real(), mode.imaginary));
@@ -234,14 +230,9 @@ void set_shape(ComplexMode& mode, const ClosedContact& contact, const Eigenpair&
 void add_loss_reactions(const Structure& structure, const ClosedContact& contact, ComplexMode& mode)
 {
   const Complex factor = Complex(0, 1) - mode.lambda / structure.loss_omega;
-  const Owned<Vec> force = zeros_like(mode.real);
-  Owned<Vec> rows;
-  check(MatCreateVecs(contact.reaction, nullptr, rows.put()));
   for (const auto& [part, turn] : {std::pair{mode.real.get(), factor}, {mode.imaginary.get(), Complex(0, 1) * factor}})
   {
-    check(MatMult(structure.K_loss, part, force));
-    check(MatMult(contact.reaction, force, rows));
-    const std::vector<double> reactions = all_entries(rows);
+    const std::vector<double> reactions = all_entries(product(contact.reaction, product(structure.K_loss, part)));
     for (std::size_t i = 0; i < reactions.size(); ++i) mode.reactions[i] += turn * reactions[i];
   }
 }
@@ -341,8 +332,7 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
   modes.band = settings.band;
   modes.shapes = options.shapes;
   modes.beyond_inertia = sliding.structure.G.get() || sliding.structure.H.get();
-  PetscInt free = 0;
-  check(MatGetSize(linearised.K_z, &free, nullptr));
+  const PetscInt free = row_count(linearised.K_z);
   if (free == 0)
   {
     modes.method = ModesMethod::full;

@@ -37,7 +37,7 @@ Subspace empty_subspace(const std::array<Mat, 4>& matrices)
 {
   Subspace space{empty_multivector(matrices[2]), matrices};
   for (std::size_t k = 0; k < matrices.size(); ++k)
-    if (matrices[k]) check(MatNorm(matrices[k], NORM_1, &space.norms[k]));
+    if (matrices[k]) space.norms[k] = norm_of(matrices[k], NORM_1);
   return space;
 }
 
@@ -45,10 +45,9 @@ Subspace empty_subspace(const std::array<Mat, 4>& matrices)
 /// anything.
 bool extend(Subspace& space, MultiVector X)
 {
-  PetscInt n = 0;
-  check(MatGetSize(space.matrices[2], &n, nullptr));
   const Index size = space.V.columns();
-  if (X.columns() == 0 || size >= n || extend_orthonormal(space.V, std::move(X)) == 0) return false;
+  if (X.columns() == 0 || size >= row_count(space.matrices[2]) || extend_orthonormal(space.V, std::move(X)) == 0)
+    return false;
   const MultiVector W = columns_from(space.V, size), before{W.comm, space.V.entries.leftCols(size)};
   for (std::size_t k = 0; k < space.matrices.size(); ++k)
   {
@@ -232,12 +231,9 @@ QuadraticSolution solve_on_subspace(const QuadraticProblem& problem, Mat K_loss,
 
 QuadraticSolution solve_whole(const QuadraticProblem& problem, Mat K_loss, const Window& window)
 {
-  PetscInt n = 0, first = 0;
-  check(MatGetSize(problem.K, &n, nullptr));
-  check(MatGetOwnershipRange(problem.K, &first, nullptr));
   MultiVector unit = empty_multivector(problem.K);
-  unit.entries.setZero(unit.entries.rows(), n);
-  unit.entries.middleCols(first, unit.entries.rows()).setIdentity();
+  unit.entries.setZero(unit.entries.rows(), row_count(problem.K));
+  unit.entries.middleCols(own_rows(problem.K).first, unit.entries.rows()).setIdentity();
   QuadraticSolution result = solve_on_subspace(problem, K_loss, std::move(unit), nullptr, {.window = window});
   result.outcome.kind = OutcomeKind::converged;
   return result;

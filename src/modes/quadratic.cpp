@@ -19,10 +19,7 @@ namespace
 /// Scales y to 2-norm 1.
 void normalise(Eigenpair& pair)
 {
-  double a = 0, b = 0;
-  check(VecNorm(pair.real, NORM_2, &a));
-  check(VecNorm(pair.imaginary, NORM_2, &b));
-  const double norm = std::hypot(a, b);
+  const double norm = std::hypot(norm_of(pair.real, NORM_2), norm_of(pair.imaginary, NORM_2));
   check(VecScale(pair.real, 1 / norm));
   check(VecScale(pair.imaginary, 1 / norm));
 }
@@ -103,8 +100,7 @@ double collect(PEP pep, double omega, double shift, const Window& window, std::v
 QuadraticSolution solve_by_toar(const QuadraticProblem& problem, const QuadraticSettings& settings,
                                 const Window& window)
 {
-  PetscInt n = 0;
-  check(MatGetSize(problem.K, &n, nullptr));
+  const PetscInt n = row_count(problem.K);
   const double omega = std::sqrt(window.limit);
   const Owned<Mat> M = scaled(problem.M, omega * omega), C = scaled(problem.C, omega);
   QuadraticSolution result;
@@ -186,11 +182,7 @@ void sort_and_measure(QuadraticSolution& solution)
 
 QuadraticNorms norms_of(const QuadraticProblem& problem)
 {
-  QuadraticNorms norms;
-  check(MatNorm(problem.M, NORM_1, &norms.M));
-  check(MatNorm(problem.C, NORM_1, &norms.C));
-  check(MatNorm(problem.K, NORM_1, &norms.K));
-  return norms;
+  return {norm_of(problem.M, NORM_1), norm_of(problem.C, NORM_1), norm_of(problem.K, NORM_1)};
 }
 
 double vibration_floor(const QuadraticNorms& norms)
@@ -202,13 +194,10 @@ double backward_error(const QuadraticProblem& problem, const QuadraticNorms& nor
 {
   const Owned<Vec> r = zeros_like(pair.real), s = zeros_like(pair.real);
   quadratic_residual({problem.M, problem.C, problem.K}, pair.lambda, {pair.real, pair.imaginary}, {r, s});
-  double residual[2], size[2];
-  check(VecNorm(r, NORM_2, &residual[0]));
-  check(VecNorm(s, NORM_2, &residual[1]));
-  check(VecNorm(pair.real, NORM_2, &size[0]));
-  check(VecNorm(pair.imaginary, NORM_2, &size[1]));
+  const double residual = std::hypot(norm_of(r, NORM_2), norm_of(s, NORM_2)),
+               size = std::hypot(norm_of(pair.real, NORM_2), norm_of(pair.imaginary, NORM_2));
   const double lambda = std::abs(pair.lambda), scale = lambda * lambda * norms.M + lambda * norms.C + norms.K;
-  return std::hypot(residual[0], residual[1]) / (scale * std::hypot(size[0], size[1]));
+  return residual / (scale * size);
 }
 
 using Complex = std::complex<double>;

@@ -37,8 +37,7 @@ RealModes first_of(const SymmetricEigenpairs& all, Mat K, Index count)
   modes.outcome = {OutcomeKind::converged, "", 1, 0};
   for (Index k = 0; k < std::min(count, all.lambda.size()); ++k)
   {
-    Owned<Vec> shape;
-    check(MatCreateVecs(K, shape.put(), nullptr));
+    Owned<Vec> shape = vector_of_columns(K);
     set_all_entries(shape, {all.y.col(k).data(), static_cast<std::size_t>(all.y.rows())});
     modes.omega.push_back(std::sqrt(std::max(0.0, all.lambda(k))));
     modes.shapes.push_back(std::move(shape));
@@ -72,9 +71,7 @@ double largest_residual(const RealPairs& pairs, Mat M, Mat K)
   if (pairs.x.columns() == 0) return 0;
   MultiVector residual = product(K, pairs.x);
   residual.entries -= product(M, pairs.x).entries * pairs.theta.asDiagonal();
-  double stiffness = 0;
-  check(MatNorm(K, NORM_1, &stiffness));
-  return (column_norms(residual).array() / column_norms(pairs.x).array()).maxCoeff() / stiffness;
+  return (column_norms(residual).array() / column_norms(pairs.x).array()).maxCoeff() / norm_of(K, NORM_1);
 }
 
 /// Appends the modes with low <= theta < high, found from the middle, about `expected` of them. Where they are too many
@@ -99,7 +96,7 @@ void append_between(double low, double high, int expected, ShiftInvert& pencil, 
   for (Index k = 0; k < count; ++k)
   {
     modes.omega.push_back(std::sqrt(std::max(0.0, found.theta[k])));
-    check(MatCreateVecs(pencil.K, modes.shapes.emplace_back().put(), nullptr));
+    modes.shapes.push_back(vector_of_columns(pencil.K));
     copy_column(found.x, k, modes.shapes.back());
   }
 }
@@ -147,13 +144,7 @@ RealModes search_below(Mat M, Mat K, double limit, const PencilOptions& options)
 
 void to_structure(RealModes& modes, Mat Z)
 {
-  for (Owned<Vec>& shape : modes.shapes)
-  {
-    Owned<Vec> whole;
-    check(MatCreateVecs(Z, nullptr, whole.put()));
-    check(MatMult(Z, shape, whole));
-    shape = std::move(whole);
-  }
+  for (Owned<Vec>& shape : modes.shapes) shape = product(Z, shape);
 }
 
 } // namespace
@@ -172,10 +163,8 @@ Inertia inertia_at(double limit, Mat M, Mat K, const PencilOptions& options, con
 
 RealModes solve_real_modes_below(Mat M, Mat K, double band, const ModesOptions& options)
 {
-  PetscInt n = 0;
-  check(MatGetSize(K, &n, nullptr));
   const double omega = two_pi * band;
-  if (n > options.dense_limit) return search_below(M, K, omega * omega, options.pencil);
+  if (row_count(K) > options.dense_limit) return search_below(M, K, omega * omega, options.pencil);
   const SymmetricEigenpairs all = solve_whole(M, K);
   const auto below = std::lower_bound(all.lambda.begin(), all.lambda.end(), omega * omega);
   return first_of(all, K, below - all.lambda.begin());
@@ -191,10 +180,9 @@ RealModes find_real_modes_below(const LinearisedSliding& linearised, double band
 RealModes find_real_modes_between(const LinearisedSliding& linearised, double low, double high,
                                   const ModesOptions& options)
 {
-  PetscInt n = 0;
-  check(MatGetSize(linearised.K_z, &n, nullptr));
   if (!(low < high)) return {{OutcomeKind::converged, "", 0, 0}, {}, {}};
-  if (low <= 0 || n <= options.dense_limit) return find_real_modes_below(linearised, high, options);
+  if (low <= 0 || row_count(linearised.K_z) <= options.dense_limit)
+    return find_real_modes_below(linearised, high, options);
   const auto theta = [](double frequency_hz) { return std::pow(two_pi * frequency_hz, 2); };
   ShiftInvert pencil = make_shift_invert(linearised.K_z, linearised.M_z, Keep::factor, options.pencil);
   RealModes modes{{OutcomeKind::converged, "", 0, 0}, {}, {}};

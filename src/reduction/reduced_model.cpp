@@ -88,9 +88,7 @@ using Eigen::VectorXd;
 
 Eigen::SparseMatrix<double> identity_of_rows(Mat A)
 {
-  PetscInt rows = 0;
-  check(MatGetSize(A, &rows, nullptr));
-  Eigen::SparseMatrix<double> result(rows, rows);
+  Eigen::SparseMatrix<double> result(row_count(A), row_count(A));
   result.setIdentity();
   return result;
 }
@@ -186,9 +184,8 @@ Factor energy_factor(Mat K, Mat M, double omega, Mat Z, Mat P, const FactorOptio
 AttachmentLimits limits_of(const Reduction& reduction, const Structure& structure, Index modes)
 {
   constexpr double most_lost = 0.1; // of compliance that no one chose to lose: 0.05 changes the cycle's energy by 4 %
-  PetscInt dofs = 0;
-  check(VecGetSize(structure.load, &dofs));
-  const double room = memory_for_shapes(free_memory(comm_of(structure.load))) / memory_of_reduction(dofs, 1);
+  const double room =
+      memory_for_shapes(free_memory(comm_of(structure.load))) / memory_of_reduction(entry_count(structure.load), 1);
   const auto fitting = static_cast<Index>(std::min<double>(room, all_attachments));
   const bool all = reduction.attachments == all_attachments;
   return {reduction.threshold, std::clamp<Index>(fitting - modes, 0, reduction.attachments), all ? most_lost : 1};

@@ -138,7 +138,7 @@ std::vector<PairBlock> own_blocks(const MatrixXd& W, const ReducedModel& model)
 }
 
 /// This rank's share of the columns.
-auto own_columns(MatrixXd& A, MPI_Comm comm)
+auto columns_of_rank(MatrixXd& A, MPI_Comm comm)
 {
   const Share share = share_of(A.cols(), comm);
   return A.middleCols(share.first, share.count);
@@ -169,15 +169,15 @@ void prepare(ReducedMap& map, double period)
   MatrixXd right(n, 2 * n + rows + 1);
   right << model.M - h * (1 - theta) * model.C - h * h * theta * (1 - theta) * model.K, -h * model.K, h * model.H,
       h * model.force;
-  solve_dense_in_place(model.M + h * theta * model.C + h * h * theta * theta * model.K, own_columns(right, map.comm),
-                       "reduced model: a motion has neither mass nor stiffness");
+  solve_dense_in_place(model.M + h * theta * model.C + h * h * theta * theta * model.K,
+                       columns_of_rank(right, map.comm), "reduced model: a motion has neither mass nor stiffness");
   gather_columns(right, map.comm);
   map.h = h;
   map.from_state = right.leftCols(2 * n);
   map.from_reactions = right.middleCols(2 * n, rows);
   map.from_load = right.col(2 * n + rows);
   map.W.resize(rows, rows);
-  own_columns(map.W, map.comm).noalias() = model.G * own_columns(map.from_reactions, map.comm);
+  columns_of_rank(map.W, map.comm).noalias() = model.G * columns_of_rank(map.from_reactions, map.comm);
   gather_columns(map.W, map.comm);
   const PairRows<Eigen::Index> pairs(model.directions);
   for (std::size_t i = 0; i < model.active.size(); ++i)

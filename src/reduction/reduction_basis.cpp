@@ -90,22 +90,14 @@ Extension extend(Orthonormal& basis, Index count, double threshold, Index at_mos
 /// keeps.
 template <class Visit> void solve_attachments(const Attachments& attachments, const MatrixXd& combinations, Visit visit)
 {
-  Owned<Vec> pattern, on_rows;
-  check(MatCreateVecs(attachments.P, pattern.put(), on_rows.put()));
-  PetscInt first_row = 0;
-  check(VecGetOwnershipRange(on_rows, &first_row, nullptr));
+  const Owned<Vec> pattern = vector_of_columns(attachments.P), on_rows = vector_of_rows(attachments.P);
   constexpr Index at_once = 64;
   for (Index first = 0; first < combinations.cols(); first += at_once)
   {
     std::vector<Owned<Vec>> force, shape;
     for (const auto column : combinations.middleCols(first, std::min(at_once, combinations.cols() - first)).colwise())
     {
-      PetscInt own = 0;
-      PetscScalar* entries = nullptr;
-      check(VecGetLocalSize(on_rows, &own));
-      check(VecGetArrayWrite(on_rows, &entries));
-      Eigen::VectorXd::Map(entries, own) = column.segment(first_row, own);
-      check(VecRestoreArrayWrite(on_rows, &entries));
+      set_all_entries(on_rows, {column.data(), static_cast<std::size_t>(column.size())});
       force.push_back(zeros_like(pattern));
       shape.push_back(zeros_like(pattern));
       check(MatMultTranspose(attachments.P, on_rows, force.back()));
@@ -187,17 +179,16 @@ Eigen::SparseMatrix<double> sliding_forces(const Interface& interface, const std
 
 Owned<Mat> force_rows(const Eigen::SparseMatrix<double>& forces, Mat BZ)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(BZ, &first, &last));
+  const IndexRange rows = own_rows(BZ);
   std::vector<SparseRow> own;
   for (Index force = 0; force < forces.cols(); ++force)
   {
     SparseRow row;
     for (Eigen::SparseMatrix<double>::InnerIterator entry(forces, force); entry; ++entry)
       row[to_int(entry.row())] = entry.value();
-    if (const PetscInt place = row.begin()->first; place >= first && place < last) own.push_back(std::move(row));
+    if (const PetscInt place = row.begin()->first; rows.holds(place)) own.push_back(std::move(row));
   }
-  const Owned<Mat> transposed = matrix_of_rows(own, last - first, comm_of(BZ));
+  const Owned<Mat> transposed = matrix_of_rows(own, rows.size(), comm_of(BZ));
   Owned<Mat> P;
   check(MatMatMult(transposed, BZ, MAT_INITIAL_MATRIX, PETSC_DEFAULT, P.put()));
   return P;

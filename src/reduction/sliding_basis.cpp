@@ -19,10 +19,8 @@ using Eigen::MatrixXd;
 /// The local rows of the degrees of freedom at which some row of B has an entry, ascending.
 std::vector<Index> dofs_with_entries(Mat B)
 {
-  PetscInt first = 0, last = 0, columns = 0;
-  check(MatGetOwnershipRangeColumn(B, &first, &last));
-  check(MatGetSize(B, nullptr, &columns));
-  std::vector<PetscReal> largest(static_cast<std::size_t>(columns));
+  const auto [first, last] = own_columns(B);
+  std::vector<PetscReal> largest(static_cast<std::size_t>(column_count(B)));
   check(MatGetColumnNorms(B, NORM_INFINITY, largest.data()));
   std::vector<Index> rows;
   for (PetscInt dof = first; dof < last; ++dof)
@@ -77,20 +75,16 @@ Owned<IS> set_of(MPI_Comm comm, const std::vector<PetscInt>& places)
 /// The pivots of this rank.
 Owned<IS> pivot_set(const ClosedContact& contact)
 {
-  PetscInt first = 0;
-  check(MatGetOwnershipRange(contact.Z, &first, nullptr));
   std::vector<PetscInt> own;
-  for (const Index pivot : local_pivots(contact)) own.push_back(first + static_cast<PetscInt>(pivot));
+  for (const Index pivot : local_pivots(contact))
+    own.push_back(own_rows(contact.Z).first + static_cast<PetscInt>(pivot));
   return set_of(comm_of(contact.Z), own);
 }
 
-/// The rows that this rank has, or as many columns as it has of vectors that A multiplies.
-Owned<IS> own_range(Mat A, PetscErrorCode (*range)(Mat, PetscInt*, PetscInt*))
+Owned<IS> set_of(MPI_Comm comm, const IndexRange& range)
 {
-  PetscInt first = 0, last = 0;
   Owned<IS> set;
-  check(range(A, &first, &last));
-  check(ISCreateStride(comm_of(A), last - first, first, 1, set.put()));
+  check(ISCreateStride(comm, range.size(), range.first, 1, set.put()));
   return set;
 }
 
@@ -180,11 +174,10 @@ Index extend(SlidingBasis& basis, MultiVector X)
 
 std::vector<Index> local_pivots(const ClosedContact& contact)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(contact.Z, &first, &last));
+  const IndexRange own = own_rows(contact.Z);
   std::vector<Index> rows;
   for (const PetscInt pivot : contact.pivots)
-    if (pivot >= first && pivot < last) rows.push_back(pivot - first);
+    if (own.holds(pivot)) rows.push_back(pivot - own.first);
   return rows;
 }
 
@@ -217,8 +210,7 @@ Lift lift(const SlidingBasis& basis, const ClosedContact& contact, Mat by)
   // rows of pivots have entries at other degrees of freedom of the contact alone
   std::vector<Index> rows;
   std::vector<PetscInt> columns;
-  PetscInt first = 0;
-  check(MatGetOwnershipRangeColumn(by, &first, nullptr));
+  const PetscInt first = own_columns(by).first;
   for (std::size_t below = 0; const Index dof : basis.contact_dofs)
   {
     while (below < pivots.size() && pivots[below] < dof) ++below;
@@ -234,7 +226,7 @@ Lift lift(const SlidingBasis& basis, const ClosedContact& contact, Mat by)
 
 Owned<Mat> at_pivots(Mat A, const ClosedContact& contact)
 {
-  return part_of(A, own_range(A, MatGetOwnershipRange), pivot_set(contact));
+  return part_of(A, set_of(comm_of(A), own_rows(A)), pivot_set(contact));
 }
 
 ProjectedSliding project(const SlidingBasis& basis, const LinearisedPoint& point)
@@ -283,15 +275,12 @@ MultiVector dynamic_forces(const SlidingBasis& basis, const LinearisedPoint& poi
 
 MultiVector dense_columns(Mat A)
 {
-  PetscInt first = 0, rows = 0, columns = 0;
-  check(MatGetOwnershipRange(A, &first, nullptr));
-  check(MatGetLocalSize(A, &rows, nullptr));
-  check(MatGetSize(A, nullptr, &columns));
-  MultiVector result{comm_of(A), MatrixXd::Zero(rows, columns)};
+  const IndexRange own = own_rows(A);
+  MultiVector result{comm_of(A), MatrixXd::Zero(own.size(), column_count(A))};
   for_each_row(A,
                [&](PetscInt row, std::span<const PetscInt> places, std::span<const PetscScalar> values)
                {
-                 for (std::size_t k = 0; k < places.size(); ++k) result.entries(row - first, places[k]) = values[k];
+                 for (std::size_t k = 0; k < places.size(); ++k) result.entries(row - own.first, places[k]) = values[k];
                });
   return result;
 }

@@ -281,7 +281,7 @@ void add_shape(MotionShapes& motion, Mat M, Vec v, Vec Mv)
   {
     if (motion.V.columns() > 0) subtract(motion, on_shapes(motion, image), rest);
     check(MatMult(M, rest, image));
-    check(VecDot(rest, image, &square));
+    square = dot(rest, image);
   }
   if (!(square > 0)) return;
   check(VecScale(rest, 1 / std::sqrt(square)));
@@ -306,8 +306,7 @@ int steps_between_samples(int steps, double step_size)
 
 void add_sample(MotionShapes& motion, Mat M, Vec v, Vec Mv, PetscInt most)
 {
-  double square = 0;
-  check(VecDot(v, Mv, &square));
+  const double square = dot(v, Mv);
   motion.largest = std::max(motion.largest, square);
   Eigen::VectorXd q(0);
   if (motion.V.columns() > 0) q = on_shapes(motion, Mv);

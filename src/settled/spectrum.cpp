@@ -278,9 +278,7 @@ TangentBundle make_bundle(const Flow& flow, Vec like, PetscInt count)
     // both parts weigh about the same, each column's in a ratio of its own: one degree of freedom has two columns
     const Owned<Vec> image = zeros_like(like);
     energy_image(flow, column, image);
-    double of_u = 0, of_v = 0;
-    check(VecDot(displacement(column), displacement(image), &of_u));
-    check(VecDot(velocity(column), velocity(image), &of_v));
+    const double of_u = dot(displacement(column), displacement(image)), of_v = dot(velocity(column), velocity(image));
     if (of_u > 0 && of_v > 0)
       check(VecScale(velocity(column), (1 + 0.37 * static_cast<double>(k)) * std::sqrt(of_u / of_v)));
     bundle.columns.push_back(std::move(column));

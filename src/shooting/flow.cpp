@@ -47,9 +47,7 @@ Vec velocity(Vec state)
 
 PetscInt dofs_of(Vec state)
 {
-  PetscInt dofs = 0;
-  check(VecGetSize(displacement(state), &dofs));
-  return dofs;
+  return entry_count(displacement(state));
 }
 
 void energy_image(const Flow& flow, Vec x, Vec image)
@@ -62,9 +60,7 @@ double energy_product(const Flow& flow, Vec a, Vec b)
 {
   const Owned<Vec> image = zeros_like(b);
   energy_image(flow, b, image);
-  double product = 0;
-  check(VecDot(a, image, &product));
-  return product;
+  return dot(a, image);
 }
 
 double energy_norm(const Flow& flow, Vec a)

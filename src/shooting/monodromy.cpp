@@ -175,11 +175,9 @@ namespace
 /// Displacements with one entry 1 each.
 MultiVector unit_displacements(const Flow& flow)
 {
-  PetscInt first = 0, last = 0, n = 0;
-  check(MatGetSize(flow.M, &n, nullptr));
-  check(MatGetOwnershipRangeColumn(flow.M, &first, &last));
-  MultiVector X{comm_of(flow.M), Eigen::MatrixXd::Zero(last - first, n)};
-  X.entries.middleCols(first, last - first).diagonal().setOnes();
+  const IndexRange own = own_columns(flow.M);
+  MultiVector X{comm_of(flow.M), Eigen::MatrixXd::Zero(own.size(), row_count(flow.M))};
+  X.entries.middleCols(own.first, own.size()).diagonal().setOnes();
   return X;
 }
 
@@ -189,8 +187,7 @@ MultiVector displacements_without_held(const Flow& flow)
   const MultiVector units = unit_displacements(flow);
   if (!flow.offsets.without_held) return units;
   MultiVector without = units;
-  Owned<Vec> x;
-  check(MatCreateVecs(flow.M, x.put(), nullptr));
+  const Owned<Vec> x = vector_of_columns(flow.M);
   for (Eigen::Index k = 0; k < units.columns(); ++k)
   {
     copy_column(units, k, x);

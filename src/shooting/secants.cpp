@@ -14,9 +14,8 @@ namespace
 /// The rows of phase and arclength of a change.
 std::array<double, 2> rows_of(const BorderedSystem& system, const BorderedVector& change)
 {
-  std::array<double, 2> rows{};
-  check(VecDot(system.phase, change.state, &rows[0]));
-  if (system.along.get()) check(VecDot(system.along, change.state, &rows[1]));
+  std::array<double, 2> rows{dot(system.phase, change.state), 0};
+  if (system.along.get()) rows[1] = dot(system.along, change.state);
   rows[1] += system.along_period * change.period + system.along_parameter * change.parameter;
   return rows;
 }
@@ -40,9 +39,7 @@ BorderedVector image_of(const Flow& flow, const BorderedScales& s, const Bordere
 
 double plain_product(const BorderedVector& image, const BorderedVector& z)
 {
-  double product = 0;
-  check(VecDot(image.state, z.state, &product));
-  return product + image.period * z.period + image.parameter * z.parameter;
+  return dot(image.state, z.state) + image.period * z.period + image.parameter * z.parameter;
 }
 
 double norm(const BorderedSystem& system, const BorderedVector& z)

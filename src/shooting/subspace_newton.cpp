@@ -76,7 +76,7 @@ void form_residual(SubspaceSystem& system, Vec y, Vec R)
   {
     const Owned<Vec> moved = copy_of(system.orbit.state);
     check(VecAXPY(moved, -1, system.anchor));
-    check(VecDot(system.phase, moved, &along));
+    along = dot(system.phase, moved);
   }
   set_rows(system, along, system.orbit.defect, R);
 }
@@ -101,9 +101,7 @@ void multiply_jacobian(SubspaceSystem& system, Vec in, Vec out)
   system.problem.flow.apply_tangent(std::span(&column, 1));
   ++system.log.convergence.periods;
   check(VecAXPBYPCZ(image, -1, y[0], 1, x, system.orbit.rate));
-  double along = 0;
-  check(VecDot(system.phase, x, &along));
-  set_rows(system, along, image, out);
+  set_rows(system, dot(system.phase, x), image, out);
 }
 
 /// Adds a record and sets `reason`, besides the library's own reasons, in two cases. The iterate falls onto the

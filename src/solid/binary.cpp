@@ -332,8 +332,7 @@ Owned<Mat> probe_rows(const std::vector<Probe>& probes, const MatrixRows& rows, 
 
 Elimination::Elimination(const std::vector<PetscInt>& held, Vec layout)
 {
-  PetscInt first = 0, last = 0;
-  check(VecGetOwnershipRange(layout, &first, &last));
+  const auto [first, last] = own_range(layout);
   std::vector<PetscInt> kept;
   for (PetscInt row = first; row < last; ++row)
     if (!std::binary_search(held.begin(), held.end(), row)) kept.push_back(row);
@@ -352,10 +351,9 @@ Owned<Mat> Elimination::square(Mat A) const
 Owned<Mat> Elimination::columns(Mat A) const
 {
   if (!A) return {};
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(A, &first, &last));
+  const IndexRange own = own_rows(A);
   Owned<IS> rows;
-  check(ISCreateStride(comm_of(A), last - first, first, 1, rows.put()));
+  check(ISCreateStride(comm_of(A), own.size(), own.first, 1, rows.put()));
   Owned<Mat> result;
   check(MatCreateSubMatrix(A, rows, kept_, MAT_INITIAL_MATRIX, result.put()));
   return result;

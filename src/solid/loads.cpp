@@ -161,9 +161,7 @@ void assemble_preload(Structure& structure, const NumberedMesh& numbered, const 
 
 double tension_of(const TightBolt& bolt, Vec u)
 {
-  double pulled = 0;
-  check(VecDot(bolt.pull, u, &pulled));
-  return bolt.stiffness * bolt.shortening - pulled + bolt.own;
+  return bolt.stiffness * bolt.shortening - dot(bolt.pull, u) + bolt.own;
 }
 
 namespace

@@ -138,18 +138,15 @@ void add_skew(const std::filesystem::path& file, PetscInt size, Owned<Mat>& skew
 void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
 {
   Owned<Mat> D;
-  Owned<Vec> diagonal;
+  const Owned<Vec> diagonal = vector_of_rows(M);
   PetscReal largest = 0;
-  check(MatCreateVecs(M, nullptr, diagonal.put()));
   check(MatGetDiagonal(M, diagonal));
   check(VecAbs(diagonal));
   check(VecMax(diagonal, nullptr, &largest));
   if (largest == 0) largest = 1;
   PetscScalar* entries = nullptr;
-  PetscInt own = 0;
-  check(VecGetLocalSize(diagonal, &own));
   check(VecGetArray(diagonal, &entries));
-  for (PetscInt i = 0; i < own; ++i)
+  for (PetscInt i = 0; i < own_rows(M).size(); ++i)
     if (entries[i] == 0) entries[i] = largest; // a motion without mass
   check(VecRestoreArray(diagonal, &entries));
   check(MatDuplicate(M, MAT_DO_NOT_COPY_VALUES, D.put()));
@@ -198,7 +195,7 @@ Structure read_structure(const std::filesystem::path& folder, MPI_Comm comm)
   add_skew(folder / "H.petsc", size, structure.H, comm);
   share_pattern(structure);
   check_mass(structure.M, folder / "M.petsc", comm);
-  check(MatCreateVecs(structure.K, nullptr, structure.load.put()));
+  structure.load = vector_of_rows(structure.K);
   if (!is_there(folder / "F.petsc", comm))
   {
     check(VecSet(structure.load, 0));

@@ -141,8 +141,8 @@ std::vector<double> displacements(const Structure& structure, Vec force)
 {
   constexpr int passes = 50;
   constexpr double enough = 1e-6, rounding = 1e-13;
-  double size = 0, last = HUGE_VAL;
-  check(VecNorm(force, NORM_2, &size));
+  const double size = norm_of(force, NORM_2);
+  double last = HUGE_VAL;
   PencilFactor factor(structure.K, structure.M, Keep::factor, {});
   factor.factorise(-1e-8 * trace(structure.K) / trace(structure.M)); // below every eigenvalue of K x = theta M x
   const Owned<Vec> u = zeros_like(force), residual = zeros_like(force), change = zeros_like(force);
@@ -153,8 +153,7 @@ std::vector<double> displacements(const Structure& structure, Vec force)
     check(VecAXPY(u, 1, change));
     check(MatMult(structure.K, u, residual));
     check(VecAYPX(residual, -1, force));
-    double now = 0;
-    check(VecNorm(residual, NORM_2, &now));
+    const double now = norm_of(residual, NORM_2);
     if (now <= rounding * size || now > last / 2)
     {
       last = std::min(last, now);
@@ -192,8 +191,7 @@ void add_spin(Structure& structure, const NumberedMesh& numbered, const Scene& s
   const std::vector<Spinning> elements = spinning_elements(numbered, scene, rank_of(comm));
 
   Owned<Mat> centrifugal;
-  Owned<Vec> force;
-  check(MatCreateVecs(structure.K, nullptr, force.put()));
+  const Owned<Vec> force = vector_of_rows(structure.K);
   check(VecSet(force, 0));
   for (Owned<Mat>* A : {&structure.G, &centrifugal}) check(MatDuplicate(structure.K, MAT_DO_NOT_COPY_VALUES, A->put()));
   for (const Spinning& of : elements)

@@ -227,10 +227,7 @@ std::vector<StuckPair> stuck_pairs(const SlidingEquilibrium& sliding, const Line
   quadratic_residual(matrices, mode.lambda, {mode.real, mode.imaginary}, {real, imaginary});
   const auto friction_of = [&](Vec force, Vec motion)
   {
-    Owned<Vec> rows;
-    check(MatCreateVecs(linearised.contact.friction, nullptr, rows.put()));
-    check(MatMult(linearised.contact.friction, force, rows));
-    std::vector<double> friction = all_entries(rows);
+    std::vector<double> friction = all_entries(product(linearised.contact.friction, force));
     const std::vector<double> moved = relative(interface, motion);
     for (std::size_t i = 0; i < interface.gap.size(); ++i)
       for (std::size_t k = 0; k < static_cast<std::size_t>(interface.directions); ++k)
@@ -257,16 +254,7 @@ std::vector<StuckPair> stuck_pairs(const SlidingEquilibrium& sliding, const Line
 // (Re(phi).A Re(phi) + Im(phi).A Im(phi))
 double quadratic_form(Mat A, const ComplexMode& mode)
 {
-  const Owned<Vec> product = zeros_like(mode.real);
-  double sum = 0;
-  for (const Vec part : {mode.real.get(), mode.imaginary.get()})
-  {
-    double value = 0;
-    check(MatMult(A, part, product));
-    check(VecDot(part, product, &value));
-    sum += value;
-  }
-  return sum;
+  return dot(mode.real, product(A, mode.real)) + dot(mode.imaginary, product(A, mode.imaginary));
 }
 
 // Phase at which the smallest reaction at t = 0, min over pairs of r_n0 + q Re(rho e^{i phase}), is largest; the start

@@ -88,9 +88,8 @@ void move_slip(const StepBatch& batch, const std::vector<ContactStatus>& statuse
 /// Work of what no load factor scales. Collective.
 double preload_work(const StepBatch& batch, const Structure& structure, Vec v_theta)
 {
-  double power = 0;
-  if (structure.preload.get() && batch.factors.load != 1) check(VecDot(structure.preload, v_theta, &power));
-  return batch.step.h * (1 - batch.factors.load) * power;
+  if (!structure.preload.get() || batch.factors.load == 1) return 0;
+  return batch.step.h * (1 - batch.factors.load) * dot(structure.preload, v_theta);
 }
 
 /// Works of each step from the products at both ends; all reductions in one message.
@@ -216,11 +215,9 @@ bool needs_another_pass(double change, double before, int count, double h)
 /// |x - before| over |scale|; overwrites `before`.
 double relative_change(Vec x, Vec before, Vec scale)
 {
-  double size = 0, change = 0;
   check(VecAXPY(before, -1, x));
-  check(VecNorm(before, NORM_2, &change));
-  check(VecNorm(scale, NORM_2, &size));
-  return change == 0 ? 0 : change / size;
+  const double change = norm_of(before, NORM_2);
+  return change == 0 ? 0 : change / norm_of(scale, NORM_2);
 }
 
 } // namespace
@@ -320,10 +317,7 @@ StepWork begin_steps(const ThetaStep& step, const Structure& structure, const In
   check(MatMult(structure.K, state.v, work.dv));
   check(VecAXPY(work.Av, step.h * step.h * step.theta * step.theta, work.dv));
   check(MatMult(structure.K, state.u, work.Ku));
-  double kinetic = 0, potential = 0;
-  check(VecDot(state.v, work.Mv, &kinetic));
-  check(VecDot(state.u, work.Ku, &potential));
-  work.energy = (kinetic + potential) / 2;
+  work.energy = (dot(state.v, work.Mv) + dot(state.u, work.Ku)) / 2;
   state.reactions.resize(interface.size(), 0);
   if (!has_elastic_slip(interface))
     state.slip.clear();

@@ -23,14 +23,7 @@ ModeAmplitude follow(const Structure& structure, const Equilibrium& equilibrium,
   check(VecAXPBYPCZ(amplitude.v_real, sigma, -omega, 0, mode.real, mode.imaginary));
   check(VecAXPBYPCZ(amplitude.v_imaginary, omega, sigma, 0, mode.real, mode.imaginary));
 
-  const Owned<Vec> image = zeros_like(structure.load);
-  const auto product = [&](Vec left, Mat matrix, Vec right)
-  {
-    double value = 0;
-    check(MatMult(matrix, right, image));
-    check(VecDot(left, image, &value));
-    return value;
-  };
+  const auto product = [](Vec left, Mat matrix, Vec right) { return dot(left, squeal::product(matrix, right)); };
   amplitude.K_real = product(mode.real, structure.K, equilibrium.u);
   amplitude.K_imaginary = product(mode.imaginary, structure.K, equilibrium.u);
   amplitude.rr = product(mode.real, structure.K, mode.real) + product(amplitude.v_real, structure.M, amplitude.v_real);
@@ -94,10 +87,7 @@ struct Fluctuation
 
 Fluctuation about(const Structure& structure, const Equilibrium& equilibrium)
 {
-  Fluctuation fluctuation{equilibrium.u, zeros_like(structure.load), zeros_like(structure.load),
-                          zeros_like(structure.load)};
-  check(MatMult(structure.K, equilibrium.u, fluctuation.Ku0));
-  return fluctuation;
+  return {equilibrium.u, product(structure.K, equilibrium.u), zeros_like(structure.load), zeros_like(structure.load)};
 }
 
 /// Differences are taken before products: near equilibrium du'K du is a small part of u'K u.
@@ -267,10 +257,8 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
   Owned<Vec> probe_values;
   if (probes)
   {
-    PetscInt rows = 0;
-    check(MatCreateVecs(probes, nullptr, probe_values.put()));
-    check(VecGetSize(probe_values, &rows));
-    history.probes.resize(static_cast<std::size_t>(rows));
+    probe_values = vector_of_rows(probes);
+    history.probes.resize(static_cast<std::size_t>(row_count(probes)));
   }
   double iterations = 0;
   const MPI_Comm comm = comm_of(structure.load);

@@ -22,9 +22,10 @@ struct Error : std::runtime_error
 };
 
 /// A library call failed, perhaps on this rank alone: the program cannot go on, and must take the other ranks with it.
-struct LibraryError : Error
+/// It is no Error, so that work that goes on after one passes this on.
+struct LibraryError : std::runtime_error
 {
-  using Error::Error;
+  using std::runtime_error::runtime_error;
 };
 
 /// Memory ran out on some rank, and every rank throws.

@@ -107,8 +107,33 @@ Owned<Vec> zeros_like(Vec pattern);
 Owned<Vec> vector_of_columns(Mat A);
 Owned<Vec> vector_of_rows(Mat A);
 
-/// A'. Collective.
+/// A x, and A'. Collective.
+Owned<Vec> product(Mat A, Vec x);
 Owned<Mat> transpose_of(Mat A);
+
+/// x.y, and norms. Collective.
+double dot(Vec x, Vec y);
+double norm_of(Vec x, NormType type);
+double norm_of(Mat A, NormType type);
+
+/// Numbers on all ranks.
+PetscInt entry_count(Vec x);
+PetscInt row_count(Mat A);
+PetscInt column_count(Mat A);
+
+/// A range of numbers, without the last.
+struct IndexRange
+{
+  PetscInt first = 0, last = 0;
+
+  PetscInt size() const { return last - first; }
+  bool holds(PetscInt number) const { return number >= first && number < last; }
+};
+
+/// What this rank has: entries, rows, and columns as of the vectors that A multiplies.
+IndexRange own_range(Vec x);
+IndexRange own_rows(Mat A);
+IndexRange own_columns(Mat A);
 
 /// Return a vector, and a matrix, of the same layout and entries.
 Owned<Vec> copy_of(Vec source);
@@ -135,8 +160,7 @@ RowLayout row_layout(Mat A);
 /// Calls visit(row, columns, values) for every row of this rank. The spans are valid during the call only.
 template <class Visit> void for_each_row(Mat A, Visit visit)
 {
-  PetscInt first = 0, last = 0;
-  check(MatGetOwnershipRange(A, &first, &last));
+  const auto [first, last] = own_rows(A);
   for (PetscInt row = first; row < last; ++row)
   {
     PetscInt count = 0;
