@@ -111,7 +111,8 @@ double memory_of_equilibrium(const Sizes& sizes)
 double memory_of_modes(const Sizes& sizes, const ModesOptions& options, MPI_Comm comm)
 {
   if (sizes.dofs <= static_cast<double>(options.dense_limit)) return dense_copies * number * sizes.dofs * sizes.dofs;
-  return 6 * matrix_entry * sizes.entries + 2 * forecast_pencil(sizes.factor, sizes.entries, options.pencil, comm) +
+  return 6 * matrix_entry * sizes.entries +
+         forecast_pencil(sizes.factor, sizes.entries, Keep::lu, options.pencil, comm) +
          number * vectors_of_modes * sizes.dofs;
 }
 
@@ -122,7 +123,8 @@ double memory_of_response(const Sizes& sizes, const Scene& scene, const ProgramO
   const double driven = static_cast<double>(scene.response->excitation.size()),
                read = static_cast<double>(scene.probes.size());
   const double pairs = (driven > 0 ? driven : read) * read;
-  return 8 * matrix_entry * sizes.entries + forecast_pencil(sizes.factor, sizes.entries, options.modes.pencil, comm) +
+  return 8 * matrix_entry * sizes.entries +
+         forecast_pencil(sizes.factor, sizes.entries, Keep::factor, options.modes.pencil, comm) +
          number * 2 * std::min(sizes.dofs, shapes_of_response) * sizes.dofs +
          3 * 2 * number * sizes.ranks * pairs * scene.response->count;
 }

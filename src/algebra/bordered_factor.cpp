@@ -120,6 +120,7 @@ FactorForecast multifrontal_forecast(const SymbolicFactor& symbolic)
     const double columns = supernode.columns, inner = supernode.inner();
     const double front = square(columns + inner);
     forecast.symmetric = std::max(forecast.symmetric, symmetric + waiting + front);
+    forecast.working = std::max(forecast.working, waiting + front);
     for (const int child : supernode.children)
       waiting -= square(symbolic.supernodes[static_cast<std::size_t>(child)].inner());
     waiting += square(inner);

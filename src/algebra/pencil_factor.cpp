@@ -8,6 +8,7 @@
 #include "squeal/algebra/shift_invert.hpp"
 
 #include "squeal/base/broadcast.hpp"
+#include "squeal/base/checkpoint.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "symbolic_factor.hpp"
@@ -157,6 +158,24 @@ bool is_made_whole(double entries, const PencilOptions& options, MPI_Comm comm)
   return ranks_of(comm) > 1 && entries * sizeof(double) / 1e9 <= options.whole_limit;
 }
 
+/// Whether a factor of so many bytes is kept in files. Beside it there are matrices and as many vectors again.
+/// Collective.
+bool exceeds_memory(double bytes, MPI_Comm comm)
+{
+  constexpr double share = 0.4; // of what is free
+  return bytes > share * free_memory(comm);
+}
+
+/// Keeps the factor in files, which end with the instance.
+void use_files(DMUMPS_STRUC_C& mumps)
+{
+  const std::filesystem::path& folder = checkpoint_folder();
+  control(mumps, 22) = 1;
+  if (folder.empty() || folder.native().size() >= sizeof mumps.ooc_tmpdir) return; // then in MUMPS's own place
+  std::filesystem::create_directories(folder);
+  std::copy_n(folder.c_str(), folder.native().size() + 1, mumps.ooc_tmpdir);
+}
+
 /// The entries of all ranks on every rank.
 Triplets everywhere(Triplets entries, MPI_Comm comm)
 {
@@ -250,16 +269,22 @@ PencilFactor::PencilFactor(Mat K, Mat M, Keep keep, const PencilOptions& options
   mumps.perm_in = positions.data();
   parts.run_together([&] { run(mumps, Job::analyse); });
   mumps.perm_in = nullptr;
+  const bool kept = keep != Keep::count && M; // without M it is a step's, which is read too often for files
+  if (control(mumps, 22) == 1 || (kept && exceeds_memory(foreseen_memory(), parts.comm)))
+    on_every_rank(parts.comm, [&] { use_files(mumps); });
 }
 
 PencilFactor::~PencilFactor() = default;
 
-double forecast_pencil(const FactorForecast& forecast, double entries_of_K, const PencilOptions& options, MPI_Comm comm)
+double forecast_pencil(const FactorForecast& forecast, double entries_of_K, Keep keep, const PencilOptions& options,
+                       MPI_Comm comm)
 {
   // the place, both entries, K - shift M, and that once more in MUMPS's order
   constexpr double an_entry = 2 * sizeof(int) + 3 * sizeof(double) + sizeof(double) + sizeof(MUMPS_INT);
-  const double copies = is_made_whole(forecast.entries, options, comm) ? ranks_of(comm) : 1;
-  return copies * (an_entry * entries_of_K / 2 + sizeof(double) * forecast.symmetric); // the lower half
+  const double copies = is_made_whole(forecast.entries, options, comm) ? ranks_of(comm) : 1,
+               halves = keep == Keep::lu ? 2 : 1, kept = halves * forecast.symmetric * sizeof(double);
+  const bool in_files = keep == Keep::count || exceeds_memory(kept, comm);
+  return copies * (halves * an_entry * entries_of_K / 2 + (in_files ? forecast.working * sizeof(double) : kept));
 }
 
 bool PencilFactor::factorise(double shift)

@@ -115,6 +115,11 @@ void open_checkpoints(const CheckpointPlace& given)
                 file.string() + "): give those, or begin again without --restart");
 }
 
+const fs::path& checkpoint_folder()
+{
+  return place().folder;
+}
+
 void keep(const std::string& name, MPI_Comm comm, const Description& describe)
 {
   checkpoint_made();

@@ -1,10 +1,14 @@
 // ranks: 1 2 3
 // The factor of K - shift M by either way of several ranks, where every rank makes it whole and where they share it:
 // residuals of a matrix whose condition is below 1e4 are below 1e-11 of the right-hand side.
+#include "../support/option.hpp"
 #include "../support/small_models.hpp"
+#include "../support/temporary_folder.hpp"
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/base/checkpoint.hpp"
 
 #include <doctest/doctest.h>
+#include <filesystem>
 #include <utility>
 
 using namespace squeal;
@@ -68,4 +72,30 @@ TEST_CASE("solutions and counts do not depend on how the ranks make the factor")
       CHECK(below == counting.negative_pivots()); // on all ranks
     }
   }
+}
+
+TEST_CASE("a factor in files solves as one in memory, and takes the files with it")
+{
+  const test::TemporaryFolder place;
+  const std::filesystem::path folder = place.path / "checkpoints";
+  const test::Option in_files("-modes_mat_mumps_icntl_22", "1");
+  open_checkpoints({folder, "", false});
+  const Owned<Mat> M = mass(37), K = stiffness(37);
+  for (const double whole_limit : {0., 1.})
+    for (const Keep keep : {Keep::factor, Keep::lu})
+    {
+      {
+        PencilFactor factor(K, M, keep, {.whole_limit = whole_limit});
+        REQUIRE(factor.factorise(2.6));
+        MPI_Barrier(PETSC_COMM_WORLD);
+        CHECK_FALSE(std::filesystem::is_empty(folder));
+        const MultiVector B = random_multivector(K, 7);
+        CHECK(residual(K, M, 2.6, factor.solve(B), B) < 1e-11);
+        MPI_Barrier(PETSC_COMM_WORLD);
+      }
+      MPI_Barrier(PETSC_COMM_WORLD);
+      CHECK(std::filesystem::is_empty(folder));
+      MPI_Barrier(PETSC_COMM_WORLD);
+    }
+  open_checkpoints({});
 }

@@ -100,6 +100,7 @@ struct FactorForecast
   FactorKind kind = FactorKind::automatic; // that it will be
   double bytes = 0;                        // of a Factor while it is made, without its Schur complement
   double symmetric = 0;                    // numbers in MUMPS's L D L' of A while it is made
+  double working = 0;                      // of these, at most in fronts and waiting updates
   double entries = 0;                      // of L of A alone
   double operations = 0;                   // to make a Factor, on the rank that has most to do
 };

@@ -36,8 +36,8 @@ struct EliminationOrder
 /// By the lower triangle of K. Collective.
 EliminationOrder elimination_order(Mat K);
 
-/// The order of elimination is found once and serves every shift. Members are collective, but for those that return a
-/// number.
+/// The order of elimination is found once and serves every shift. Where memory would not hold the factor beside all
+/// else, it is kept in files of the checkpoints' folder. Members are collective, but for those that return a number.
 class PencilFactor
 {
 public:
@@ -64,8 +64,8 @@ private:
   std::unique_ptr<Parts> parts_;
 };
 
-/// Memory of a PencilFactor of K and M on all ranks together [bytes], by the forecast of a factor of K.
-double forecast_pencil(const FactorForecast& forecast, double entries_of_K, const PencilOptions& options,
+/// Memory of a PencilFactor of K and M on all ranks together [bytes], by the forecast of a factor of K. Collective.
+double forecast_pencil(const FactorForecast& forecast, double entries_of_K, Keep keep, const PencilOptions& options,
                        MPI_Comm comm);
 
 // The eigenvalues theta of K y = theta M y nearest a real shift. A block Krylov space of (K - shift

@@ -95,6 +95,10 @@ struct CheckpointPlace
 /// Sets the place of this run. Error: the checkpoints to go on from are of another request.
 void open_checkpoints(const CheckpointPlace& place);
 
+/// The folder of the run's checkpoints, for files that a stage needs while it works; empty where a run has none. They
+/// leave with the checkpoints.
+const std::filesystem::path& checkpoint_folder();
+
 /// Writes a checkpoint under a name, whole or not at all. A disk that is full is a warning: the run is worth more.
 /// Collective.
 void keep(const std::string& name, MPI_Comm comm, const Description& describe);
