@@ -2,7 +2,6 @@
 
 #include "squeal/base/cost.hpp"
 #include "squeal/cycle/floquet.hpp"
-#include "squeal/cycle/preconditioner.hpp"
 #include "squeal/scene/numbers.hpp"
 
 #include <algorithm>

@@ -57,7 +57,7 @@ std::string find_by_reduced_model(CycleProblem& problem, const CycleOptions& opt
   ReducedCycle reduced;
   if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty()) return reason;
   const double clock = MPI_Wtime();
-  const Owned<Vec> state = full_motion(search, reduced.state);
+  const Owned<Vec> state = copy_of(reduced.motion.get());
   check(VecAXPY(displacement(state), 1, problem.sliding.equilibrium.u));
   ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), reduced.period};
   start.is_cycle = true;
@@ -125,8 +125,8 @@ Fidelity begun(const CycleProblem& given, const FidelityRequest& request, int st
 FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, const CycleOptions& options)
 {
   declare_solver_options(comm_of(given.sliding.structure.load));
-  CycleProblem problem = with_settings(given, chosen_settings(given, request));
-  const CycleSettings& settings = problem.settings;
+  CycleProblem problem = given;
+  const CycleSettings& settings = problem.settings = chosen_settings(given, request);
   FittedCycle found;
   LimitCycle& cycle = found.cycle;
   if (const std::string refusal = step_refusal_of(problem, settings.steps_per_period); !refusal.empty())

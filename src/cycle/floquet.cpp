@@ -1,10 +1,8 @@
 #include "squeal/cycle/floquet.hpp"
 #include "reduced_flow.hpp"
-#include "reduced_spectrum.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/cost.hpp"
 #include "squeal/base/free_memory.hpp"
-#include "squeal/cycle/preconditioner.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -227,7 +225,7 @@ SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, cons
     none.missing = "the reduced model on the recorded contact has motions that the full one lacks";
     return none;
   }
-  const ReducedCoordinates coordinates = coordinates_in(*model, problem.sliding.structure);
+  const ReducedCoordinates coordinates{*model, problem.sliding.structure};
   SlowMotions slow = slow_motions_of(spectrum, *model, coordinates, start);
   slow.periods = none.periods;
   set_grid_errors(spectrum, own, other, period, contacts, slow);
@@ -303,7 +301,7 @@ void make(CycleProblem& problem, PeriodMap& map, RecordedInverse& inverse)
     const auto contacts = recorded_contacts(model, problem.sliding.interface.directions, map.records);
     const ReducedState flow = coordinates(model, problem.sliding.structure, displacement(rate), velocity(rate));
     inverse.correction = monodromy_correction(model, monodromy(own, period, contacts), flow);
-    inverse.apply = preconditioner_of(inverse.correction, coordinates_in(model, problem.sliding.structure));
+    inverse.apply = preconditioner_of(inverse.correction, {model, problem.sliding.structure});
     problem.reduced = inverse.model;
   }
   catch (const Error&) // on every rank alike: none can be made

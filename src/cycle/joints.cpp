@@ -115,43 +115,43 @@ void take_out_tangents(const Interface& interface, const std::vector<char>& pair
   add_reactions(interface, forces, x);
 }
 
-void JointUseMeter::add_step(const Interface& interface, const std::vector<double>& reactions,
-                             const std::vector<ContactStatus>& statuses)
-{
-  const PairView r(reactions, interface.directions);
-  std::size_t joint = 0, row = 0;
-  for (std::size_t i = 0; i < statuses.size(); ++i)
-  {
-    if (!is_undriven(interface, i)) continue;
-    const double limit = friction_coefficient(interface.friction.of(i), 0).value * r.normal(i);
-    largest_.resize(std::max(largest_.size(), joint + 1));
-    use_.slipped.resize(largest_.size());
-    use_.least.resize(std::max(use_.least.size(), row + r.tangential(i).size()), HUGE_VAL);
-    use_.greatest.resize(use_.least.size(), -HUGE_VAL);
-    for (const double friction : r.tangential(i))
-    {
-      const double part = limit > 0 ? friction / limit : 0;
-      use_.least[row] = std::min(use_.least[row], part);
-      use_.greatest[row] = std::max(use_.greatest[row], part);
-      ++row;
-    }
-    if (limit > 0) largest_[joint] = std::max(largest_[joint], length(r.tangential(i)) / limit);
-    use_.slipped[joint] = use_.slipped[joint] || statuses[i] != ContactStatus::stick;
-    ++joint;
-  }
-}
-
-JointUse JointUseMeter::result() const
+JointUse joint_use(const Interface& interface, std::span<const StepRecord> records)
 {
   constexpr double edge = 1 - 1e-3;
-  JointUse result = use_;
-  for (std::size_t joint = 0; joint < largest_.size(); ++joint)
+  JointUse use;
+  std::vector<double> largest; // of each undriven pair
+  for (const StepRecord& record : records)
   {
-    ++(use_.slipped[joint] ? result.slipping : result.held);
-    result.at_edge += !use_.slipped[joint] && largest_[joint] >= edge;
-    result.largest = std::max(result.largest, largest_[joint]);
+    const PairView r(record.reactions, interface.directions);
+    const std::vector<ContactStatus> statuses = contact_status(interface, record.reactions, record.contact_velocity);
+    std::size_t joint = 0, row = 0;
+    for (std::size_t i = 0; i < statuses.size(); ++i)
+    {
+      if (!is_undriven(interface, i)) continue;
+      const double limit = friction_coefficient(interface.friction.of(i), 0).value * r.normal(i);
+      largest.resize(std::max(largest.size(), joint + 1));
+      use.slipped.resize(largest.size());
+      use.least.resize(std::max(use.least.size(), row + r.tangential(i).size()), HUGE_VAL);
+      use.greatest.resize(use.least.size(), -HUGE_VAL);
+      for (const double friction : r.tangential(i))
+      {
+        const double part = limit > 0 ? friction / limit : 0;
+        use.least[row] = std::min(use.least[row], part);
+        use.greatest[row] = std::max(use.greatest[row], part);
+        ++row;
+      }
+      if (limit > 0) largest[joint] = std::max(largest[joint], length(r.tangential(i)) / limit);
+      use.slipped[joint] = use.slipped[joint] || statuses[i] != ContactStatus::stick;
+      ++joint;
+    }
   }
-  return result;
+  for (std::size_t joint = 0; joint < largest.size(); ++joint)
+  {
+    ++(use.slipped[joint] ? use.slipping : use.held);
+    use.at_edge += !use.slipped[joint] && largest[joint] >= edge;
+    use.largest = std::max(use.largest, largest[joint]);
+  }
+  return use;
 }
 
 void OwnRest::follow(const SlidingEquilibrium& path, const FactorOptions& factor, const JointMotion& motion)

@@ -4,7 +4,6 @@
 #include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/cycle/floquet.hpp"
-#include "squeal/cycle/preconditioner.hpp"
 #include "squeal/equilibrium/state.hpp"
 
 #include <algorithm>
@@ -161,12 +160,6 @@ CycleProblem at_equilibrium(const CycleProblem& problem, const SlidingEquilibriu
 {
   return {sliding,          problem.linearised, problem.modes,         problem.unstable,
           problem.settings, problem.step,       problem.modes_options, problem.probes};
-}
-
-CycleProblem with_settings(CycleProblem problem, const CycleSettings& settings)
-{
-  problem.settings = settings;
-  return problem;
 }
 
 std::optional<State> state_on_modes(const SlidingEquilibrium& sliding, const UnstableModes& unstable,

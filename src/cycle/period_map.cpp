@@ -238,7 +238,6 @@ MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double
   set_period(map, period);
   const std::int64_t samples = recording.samples; // done * samples may not fit an int
   int done = 0;
-  JointUseMeter joints;
   std::span<StepRecord> records; // what joints do is known from the steps' contact
   if (has_undriven_pairs(map.sliding.interface))
   {
@@ -250,7 +249,6 @@ MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double
   const auto watch = [&](const State& now, const StepReport&, const StepWork&)
   {
     measured.statuses.push_back(contact_status(map.sliding.interface, now.reactions, now.v));
-    if (!records.empty()) joints.add_step(map.sliding.interface, now.reactions, measured.statuses.back());
     // evenly spread over the period whatever the two numbers
     if ((done + 1) * samples / map.steps > done * samples / map.steps) measured.displacements.push_back(copy_of(now.u));
     ++done;
@@ -259,7 +257,7 @@ MeasuredPeriod measure_period(PeriodMap& map, const Recording& recording, double
                                      {recording.probes, measured.history, watch, records});
   if (summary.interrupted) throw Interrupted{};
   map.unconverged += summary.unconverged;
-  measured.joints = joints.result();
+  measured.joints = joint_use(map.sliding.interface, records);
   note_joints(map, start);
   summarise(measured);
   return measured;

@@ -2,7 +2,7 @@
 
 #include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
-#include "squeal/cycle/preconditioner.hpp"
+#include "squeal/cycle/floquet.hpp"
 #include "step_refinement.hpp"
 
 #include <algorithm>
@@ -32,6 +32,12 @@ ReducedMap period_map_of(const ReducedSearch& search, int steps)
   map.reactions = Eigen::VectorXd::Map(still.data(), static_cast<Eigen::Index>(still.size()));
   map.contact.tolerance = search.fidelity.contact_tolerance;
   return map;
+}
+
+/// The coordinates of a motion (du, v).
+ReducedState on_model(const ReducedSearch& search, Vec motion)
+{
+  return coordinates(search.model(), search.problem.sliding.structure, displacement(motion), velocity(motion));
 }
 
 /// The mean fluctuating energy over one period.
@@ -102,17 +108,15 @@ void build_model(ReducedSearch& search, double amplitude)
 }
 
 /// Free periods from a motion until one comes back to within half a percent, or its fluctuation exceeds `most`.
-Orbit run_free(ReducedSearch& search, ReducedMap& map, const ReducedState& motion, double period, double most)
+Orbit run_free(ReducedSearch& search, ReducedMap& map, Vec motion, double period, double most)
 {
   const double clock = MPI_Wtime();
-  const EnergyMatrices energy = energy_matrices(map.model);
-  const Flow flow = flow_of(map, energy);
-  const Owned<Vec> start = vector_of(motion);
+  const Flow flow = flow_of(map, search.problem.sliding.structure);
   const Preconditioner none;
   Progress progress(map.comm, "reduced model, free", static_cast<double>(most_free_periods));
   ConvergenceLog log{progress};
-  const OrbitProblem problem{flow, none, zeros_like(start), period};
-  Orbit free = integrate_free_periods(problem, log, start, period, {most_free_periods, 5e-3, 0, 2e-3, most});
+  const OrbitProblem problem{flow, none, zeros_like(motion), period};
+  Orbit free = integrate_free_periods(problem, log, motion, period, {most_free_periods, 5e-3, 0, 2e-3, most});
   search.fidelity.reduced_periods += log.convergence.periods;
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;
   return free;
@@ -120,13 +124,13 @@ Orbit run_free(ReducedSearch& search, ReducedMap& map, const ReducedState& motio
 
 /// The state of the next period in which the motion passes through zero along `reference`, upwards. Cycles of a given
 /// number of steps differ a little by where among them they begin, and shooting keeps that.
-ReducedState state_in_phase(ReducedMap& map, double period, const ReducedState& motion, const ReducedState& reference)
+Owned<Vec> state_in_phase(const ReducedSearch& search, ReducedMap& map, const Orbit& motion, Vec reference)
 {
-  const Eigen::VectorXd image = map.model.K_z * reference.q;
-  ReducedState found = motion, last = motion;
+  const Eigen::VectorXd image = map.model.K_z * on_model(search, reference).q;
+  ReducedState found = on_model(search, motion.state), last = found;
   double before = image.dot(last.q);
   bool passed = false;
-  integrate(map, period, motion,
+  integrate(map, motion.period, last,
             [&](const ReducedState& now)
             {
               const double after = image.dot(now.q), part = before / (before - after);
@@ -137,31 +141,31 @@ ReducedState state_in_phase(ReducedMap& map, double period, const ReducedState& 
               last = now;
             });
   share_state(found, map.comm);
-  return found;
+  Owned<Vec> state = zeros_like(reference);
+  add_motion(map.model, found, displacement(state), velocity(state));
+  return state;
 }
 
-/// Shoots from near a cycle. Every rank does so by itself, on periods that are the same on all.
-ReducedCycle shoot_at(ReducedSearch& search, ReducedMap& map, const ReducedState& from, double period)
+/// Shoots from near a cycle.
+ReducedCycle shoot_at(ReducedSearch& search, ReducedMap& map, Vec from, double period)
 {
   const double clock = MPI_Wtime();
-  const EnergyMatrices energy = energy_matrices(map.model);
-  const Flow flow = flow_of(map, energy);
-  if (search.correction.left.size() == 0) search.correction = monodromy_correction(map, period, from);
-  const Preconditioner preconditioner = preconditioner_of(search.correction, own_coordinates());
+  const Structure& structure = search.problem.sliding.structure;
+  const Flow flow = flow_of(map, structure);
+  if (search.correction.left.size() == 0) search.correction = monodromy_correction(map, period, on_model(search, from));
+  const Preconditioner preconditioner = preconditioner_of(search.correction, {map.model, structure});
   ShootingOptions options = search.options.shooting;
   options.multipliers = 0;
   options.free_periods = most_free_periods;
-  const Owned<Vec> start = vector_of(from), rest = zeros_like(displacement(start));
   ShootingSettings settings{search.tolerance};
   settings.title = "reduced";
-  const ShootingResult found =
-      shoot(flow, preconditioner, {rest, displacement(start), velocity(start), period}, settings, options);
+  const Owned<Vec> rest = zeros_like(displacement(from));
+  ShootingResult found =
+      shoot(flow, preconditioner, {rest, displacement(from), velocity(from), period}, settings, options);
   const bool at_rest = found.outcome.kind == OutcomeKind::collapsed_to_equilibrium;
-  ReducedCycle cycle{found.outcome.kind == OutcomeKind::converged, reduced_state(found.orbit.state), found.orbit.period,
-                     0, at_rest ? std::nan("") : found.orbit.residual};
-  share_state(cycle.state, map.comm); // ranks of other processors may round otherwise
-  MPI_Bcast(&cycle.period, 1, MPI_DOUBLE, 0, map.comm);
-  cycle.energy = mean_energy(map, cycle.period, cycle.state);
+  ReducedCycle cycle{found.outcome.kind == OutcomeKind::converged, std::move(found.orbit.state), found.orbit.period, 0,
+                     at_rest ? std::nan("") : found.orbit.residual};
+  cycle.energy = mean_energy(map, cycle.period, on_model(search, cycle.motion));
   search.fidelity.reduced_periods += found.convergence.periods + 1;
   search.fidelity.reduced_seconds += MPI_Wtime() - clock;
   return cycle;
@@ -190,21 +194,12 @@ Owned<Vec> fluctuation_of(const CycleProblem& problem, const State& state)
 
 } // namespace
 
-Owned<Vec> full_motion(const ReducedSearch& search, const ReducedState& state)
-{
-  const Owned<Vec> zero = zeros_like(search.problem.sliding.structure.load);
-  Owned<Vec> motion = state_of(zero, zero);
-  add_motion(search.model(), 1, state.q, displacement(motion));
-  add_motion(search.model(), 1, state.v, velocity(motion));
-  return motion;
-}
-
 void estimate_reduced_step_errors(ReducedSearch& search, const ReducedCycle& cycle)
 {
   Fidelity& fidelity = search.fidelity;
   const int steps = search.problem.settings.steps_per_period;
   ReducedMap finer = period_map_of(search, 2 * steps);
-  const ReducedCycle twice = shoot_at(search, finer, cycle.state, cycle.period);
+  const ReducedCycle twice = shoot_at(search, finer, cycle.motion, cycle.period);
   const RelativeChange errors =
       step_errors_of({{2 * steps, twice.period, twice.energy}, {steps, cycle.period, cycle.energy}});
   fidelity.step_frequency_error = twice.converged ? errors.frequency : std::nan("");
@@ -223,8 +218,6 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
   Owned<Vec> motion = copy_of(estimated.get());
   search.real = real_modes_beyond(problem, highest_joining(search));
   double amplitude = expected * first, period = 1 / mode.frequency_hz(), unit = 0; // unit: fluctuation at amplitude 1
-  const auto on_model = [&](Vec x)
-  { return coordinates(search.model(), problem.sliding.structure, displacement(x), velocity(x)); };
   for (;;)
   {
     const std::vector<int> change = pairs_that_may_change(problem.sliding.interface, problem.sliding.equilibrium, mode,
@@ -235,23 +228,19 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
     if (const std::string refusal = size_refusal(search); !refusal.empty()) return refusal;
     build_model(search, margin * amplitude);
     ReducedMap map = period_map_of(search, problem.settings.steps_per_period);
-    const ReducedState from = on_model(motion);
-    if (unit == 0) unit = std::sqrt(doubled_energy(map.model, from)) / first;
-    Orbit free = run_free(search, map, from, period, 1.2 * unit * amplitude);
-    ReducedState end = reduced_state(free.state);
-    share_state(end, map.comm);
-    double decides[] = {free.fluctuation / unit, free.period};
-    MPI_Bcast(decides, 2, MPI_DOUBLE, 0, map.comm); // ranks that decide apart would wait for each other
-    const double reached = decides[0];
-    period = decides[1];
+    if (unit == 0) unit = std::sqrt(doubled_energy(map.model, on_model(search, motion))) / first;
+    Orbit free = run_free(search, map, motion, period, 1.2 * unit * amplitude);
+    const double reached = free.fluctuation / unit;
     if (!(reached <= runaway * amplitude)) return "the motion of the reduced model grew beyond all bounds";
     if (reached > 1.2 * amplitude && search.fidelity.reduced_periods < most_free_periods)
     {
-      motion = full_motion(search, end);
+      motion = std::move(free.state);
+      period = free.period;
       amplitude = 1.5 * reached; // it was still growing
       continue;
     }
-    cycle = shoot_at(search, map, state_in_phase(map, period, end, on_model(estimated)), period);
+    const Owned<Vec> in_phase = state_in_phase(search, map, free, estimated);
+    cycle = shoot_at(search, map, in_phase, free.period);
     break;
   }
   if (cycle.converged) return {};

@@ -24,7 +24,7 @@ struct ReducedSearch
 struct ReducedCycle
 {
   bool converged = false;
-  ReducedState state;
+  Owned<Vec> motion;   // (du, v) of the full model
   double period = 0;   // [s]
   double energy = 0;   // [J] mean fluctuating
   double residual = 0; // NaN: of a motion that fell to rest
@@ -37,8 +37,5 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
 
 /// The reduced model's cycle at twice as many steps gives the step's errors. Further ones are unknown, NaN.
 void estimate_reduced_step_errors(ReducedSearch& search, const ReducedCycle& cycle);
-
-/// A motion of the reduced model as a state (du, v) of the full one, about the equilibrium.
-Owned<Vec> full_motion(const ReducedSearch& search, const ReducedState& state);
 
 } // namespace squeal

@@ -1,5 +1,4 @@
 #include "reduced_flow.hpp"
-#include "reduced_spectrum.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/run_control.hpp"
 
@@ -7,6 +6,7 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <limits>
+#include <utility>
 
 namespace squeal
 {
@@ -16,43 +16,6 @@ namespace
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-Owned<Mat> matrix_of(const MatrixXd& values)
-{
-  Owned<Mat> result;
-  const auto n = static_cast<PetscInt>(values.rows());
-  check(MatCreateSeqDense(PETSC_COMM_SELF, n, n, nullptr, result.put()));
-  double* entries = nullptr;
-  check(MatDenseGetArrayWrite(result, &entries));
-  std::copy_n(values.data(), values.size(), entries);
-  check(MatDenseRestoreArrayWrite(result, &entries));
-  return result;
-}
-
-void put(const VectorXd& values, Vec x)
-{
-  set_all_entries(x, {values.data(), static_cast<std::size_t>(values.size())});
-}
-
-void put(const ReducedState& state, Vec x)
-{
-  put(state.q, displacement(x));
-  put(state.v, velocity(x));
-}
-
-Owned<Vec> vector_of(const VectorXd& values)
-{
-  Owned<Vec> x;
-  check(VecCreateSeq(PETSC_COMM_SELF, static_cast<PetscInt>(values.size()), x.put()));
-  put(values, x);
-  return x;
-}
-
-VectorXd entries_of(Vec x)
-{
-  const std::vector<double> values = all_entries(x);
-  return VectorXd::Map(values.data(), static_cast<Eigen::Index>(values.size()));
-}
 
 /// (q, v) in one vector.
 VectorXd stacked(const ReducedState& state)
@@ -64,37 +27,15 @@ VectorXd stacked(const ReducedState& state)
 
 } // namespace
 
-Owned<Vec> vector_of(const ReducedState& state)
+VectorXd ReducedCoordinates::of(Vec motion) const
 {
-  const Owned<Vec> q = vector_of(state.q), v = vector_of(state.v);
-  return state_of(q, v);
+  return stacked(coordinates(model, structure, displacement(motion), velocity(motion)));
 }
 
-ReducedState reduced_state(Vec state)
+void ReducedCoordinates::add(const VectorXd& coordinates, Vec motion) const
 {
-  return {entries_of(displacement(state)), entries_of(velocity(state))};
-}
-
-ReducedCoordinates own_coordinates()
-{
-  const auto of = [](Vec x) { return stacked(reduced_state(x)); };
-  const auto add = [of](const VectorXd& more, Vec x)
-  {
-    const VectorXd sum = of(x) + more;
-    put(ReducedState{sum.head(sum.size() / 2), sum.tail(sum.size() / 2)}, x);
-  };
-  return {of, add};
-}
-
-ReducedCoordinates coordinates_in(const ReducedModel& model, const Structure& structure)
-{
-  const auto of = [&](Vec x) { return stacked(coordinates(model, structure, displacement(x), velocity(x))); };
-  const auto add = [&model](const VectorXd& both, Vec x)
-  {
-    add_motion(model, 1, both.head(model.size()), displacement(x));
-    add_motion(model, 1, both.tail(model.size()), velocity(x));
-  };
-  return {of, add};
+  const Eigen::Index n = model.size();
+  add_motion(model, {coordinates.head(n), coordinates.tail(n)}, displacement(motion), velocity(motion));
 }
 
 std::vector<Owned<Vec>> motions_of(const ReducedCoordinates& coordinates, const MatrixXd& columns, Vec pattern)
@@ -108,21 +49,21 @@ std::vector<Owned<Vec>> motions_of(const ReducedCoordinates& coordinates, const 
   return motions;
 }
 
-EnergyMatrices energy_matrices(const ReducedModel& model)
+Flow flow_of(ReducedMap& map, const Structure& structure)
 {
-  return {matrix_of(model.M_z), matrix_of(model.K_z)};
-}
-
-Flow flow_of(ReducedMap& map, const EnergyMatrices& energy)
-{
-  const auto period_map = [&map](double period, Vec start, Vec end, Vec rate)
+  const auto period_map = [&](double period, Vec start, Vec end, Vec rate)
   {
     end_if_asked(map.comm);
-    const PeriodEnd period_end = end_of_period(map, period, reduced_state(start));
-    put(period_end.end, end);
-    if (rate) put(period_end.rate, rate);
+    const PeriodEnd period_end =
+        end_of_period(map, period, coordinates(map.model, structure, displacement(start), velocity(start)));
+    for (const auto& [state, motion] : {std::pair{&period_end.end, end}, {&period_end.rate, rate}})
+    {
+      if (!motion) continue;
+      check(VecSet(motion, 0));
+      add_motion(map.model, *state, displacement(motion), velocity(motion));
+    }
   };
-  return {period_map, energy.M, energy.K};
+  return {period_map, structure.M, structure.K};
 }
 
 MonodromyCorrection monodromy_correction(ReducedMap& map, double period, const ReducedState& state)
@@ -145,9 +86,9 @@ MonodromyCorrection monodromy_correction(const ReducedModel& model, const Matrix
                           "reduced model: the period map has a second multiplier 1")};
 }
 
-Preconditioner preconditioner_of(const MonodromyCorrection& correction, ReducedCoordinates coordinates)
+Preconditioner preconditioner_of(const MonodromyCorrection& correction, const ReducedCoordinates& coordinates)
 {
-  return [&correction, coordinates = std::move(coordinates)](double, Vec x, Vec y)
+  return [&correction, coordinates](double, Vec x, Vec y)
   {
     const VectorXd seen = coordinates.of(x);
     check(VecAXPBY(y, -1, 0, x));

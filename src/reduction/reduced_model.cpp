@@ -265,12 +265,19 @@ ReducedState coordinates(const ReducedModel& model, const Structure& structure, 
   return {model.E_factor.solve(seen.col(0)), model.M_factor.solve(seen.col(1))};
 }
 
-void add_motion(const ReducedModel& model, double factor, const VectorXd& q, Vec target)
+void add_motion(const ReducedModel& model, const ReducedState& state, Vec du, Vec v)
 {
-  PetscScalar* entries = nullptr;
-  check(VecGetArray(target, &entries));
-  VectorXd::Map(entries, model.shapes.entries.rows()).noalias() += factor * model.shapes.entries * q;
-  check(VecRestoreArray(target, &entries));
+  MatrixXd coordinates(model.size(), 2);
+  coordinates << state.q, state.v;
+  const MatrixXd motion = model.shapes.entries * coordinates; // the shapes are read once for both
+  Index column = 0;
+  for (const Vec target : {du, v})
+  {
+    PetscScalar* entries = nullptr;
+    check(VecGetArray(target, &entries));
+    VectorXd::Map(entries, motion.rows()) += motion.col(column++);
+    check(VecRestoreArray(target, &entries));
+  }
 }
 
 } // namespace squeal

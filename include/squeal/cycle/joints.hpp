@@ -47,18 +47,8 @@ struct OffsetSpread
   double by_period = 0, by_energy = 0; // [s/m], [J/m] of the fluctuating energy
 };
 
-/// The use over the steps of a period, by the reactions and statuses of each. Not collective.
-class JointUseMeter
-{
-public:
-  void add_step(const Interface& interface, const std::vector<double>& reactions,
-                const std::vector<ContactStatus>& statuses);
-  JointUse result() const;
-
-private:
-  JointUse use_;
-  std::vector<double> largest_; // of each undriven pair
-};
+/// The use over recorded steps. Not collective.
+JointUse joint_use(const Interface& interface, std::span<const StepRecord> records);
 
 /// The rest of a structure at the offsets of its motion, from period to period.
 class OwnRest

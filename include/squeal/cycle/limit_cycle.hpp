@@ -72,9 +72,6 @@ struct CycleProblem
 /// The problem of another brake, at its equilibrium.
 CycleProblem at_equilibrium(const CycleProblem& problem, const SlidingEquilibrium& sliding);
 
-/// The problem with other settings.
-CycleProblem with_settings(CycleProblem problem, const CycleSettings& settings);
-
 /// The state at which the unstable modes are at their estimated amplitudes; with CycleStartKind::mode the followed one
 /// alone at the scene's. Nothing where there is no amplitude.
 std::optional<State> state_on_modes(const SlidingEquilibrium& sliding, const UnstableModes& unstable,

@@ -128,7 +128,7 @@ struct ReducedState
 /// Coordinates of du and v: of the nearest shape in the energy of K + omega^2 M, and in that of M. Collective.
 ReducedState coordinates(const ReducedModel& model, const Structure& structure, Vec du, Vec v);
 
-/// target += factor shapes q. Each rank adds to its own entries.
-void add_motion(const ReducedModel& model, double factor, const Eigen::VectorXd& q, Vec target);
+/// du += shapes q, v += shapes v. Each rank adds to its own entries.
+void add_motion(const ReducedModel& model, const ReducedState& state, Vec du, Vec v);
 
 } // namespace squeal
