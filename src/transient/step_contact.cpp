@@ -5,6 +5,7 @@
 #include "squeal/contact/interface.hpp"
 
 #include <algorithm>
+#include <array>
 #include <string>
 
 namespace squeal
@@ -21,9 +22,9 @@ struct StartOfStep
 
 /// From B v_free of a trajectory: normal rows become gap rates (g0 + B_n ut)/h + B_n v_free, tangential ones sliding
 /// velocities, rows with a compliance as in section 4.16. Empty where W is not.
-std::vector<double> free_contact_velocity(const StepBatch& batch, const StartOfStep& start, std::vector<double> b)
+std::vector<double> free_contact_velocity(const OneStep& one, const StartOfStep& start, std::vector<double> b)
 {
-  const auto& [step, interface, factors, works, states, reports] = batch;
+  const auto& [step, interface, factors, work, state, report] = one;
   if (b.empty()) return b;
   const PairRows<std::size_t> rows(interface.directions);
   const PairView velocity(b, interface.directions);
@@ -65,56 +66,45 @@ void hold_anchors(const Interface& interface, const std::vector<double>& positio
 }
 
 /// Adds (B_t ut - a)/h to the tangential rows of pairs that are held at a. Where W is not, b is empty.
-void lead_back(const StepBatch& batch, const std::vector<double>& position, const StickAnchors& anchors,
+void lead_back(const OneStep& one, const std::vector<double>& position, const StickAnchors& anchors,
                std::vector<double>& b)
 {
-  const int directions = batch.interface.directions;
+  const int directions = one.interface.directions;
   const PairView<double> velocity(b, directions);
   for (std::size_t i = 0; i < std::min(velocity.pairs(), anchors.is_held.size()); ++i)
     for (std::size_t k = 0; anchors.is_held[i] && k < velocity.tangential(i).size(); ++k)
       velocity.tangential(i)[k] +=
           (PairView(position, directions).tangential(i)[k] - PairView(anchors.at, directions).tangential(i)[k]) /
-          batch.step.h;
+          one.step.h;
 }
 
-/// One trajectory's problem: w = W r + free + past.
+/// The problem of a step: w = W r + free + past.
 struct StepProblem
 {
   std::vector<double> free; // where W is
   std::vector<double> past; // as sliding_direction.hpp says
 };
 
-std::vector<StepProblem> make_problems(const StepBatch& batch, const std::vector<double>& Bv_free)
+StepProblem make_problem(const OneStep& one, const std::vector<double>& Bv_free)
 {
-  const auto& [step, interface, factors, works, states, reports] = batch;
-  const double weight = (1 - step.theta) / step.theta;
-  const auto size = static_cast<std::ptrdiff_t>(Bv_free.size() / states.size());
+  const auto& [step, interface, factors, work, state, report] = one;
   const PairFriction law_before = scaled(interface, factors.friction_before);
   std::vector<double> drive = interface.drive;
   for (double& velocity : drive) velocity *= factors.drive_start;
-  std::vector<Vec> start;
-  for (std::size_t k = 0; k < states.size(); ++k)
-  {
-    check(VecWAXPY(works[k].v_theta, step.h * (1 - step.theta), states[k].v, states[k].u)); // ut, for a moment
-    start.insert(start.end(), {works[k].v_theta, states[k].v});
-  }
-  const std::vector<std::vector<double>> motion = relative(interface, start);
-  std::vector<StepProblem> problems(states.size());
-  for (std::size_t k = 0; k < states.size(); ++k)
-  {
-    const std::vector<double>&position = motion[2 * k], &velocity = motion[2 * k + 1];
-    const auto first = Bv_free.begin() + static_cast<std::ptrdiff_t>(k) * size;
-    problems[k].free = free_contact_velocity(batch, {position, velocity, states[k].slip}, {first, first + size});
-    std::vector<ContactStatus> before =
-        status_with(interface, law_before, factors.drive_start, states[k].reactions, velocity);
-    hold_anchors(interface, position, before, works[k].anchors);
-    lead_back(batch, position, works[k].anchors, problems[k].free);
-    for (std::size_t i = 0; i < before.size(); ++i) // slip positions have no velocity of the step's start
-      if (slip_compliance_of(interface, i) > 0) before[i] = ContactStatus::stick;
-    problems[k].past = past_sliding(PairView(velocity, interface.directions),
-                                    TangentView<const double>(drive, interface.directions), before, weight);
-  }
-  return problems;
+  check(VecWAXPY(work.v_theta, step.h * (1 - step.theta), state.v, state.u)); // ut, for a moment
+  const std::vector<std::vector<double>> motion = relative(interface, std::array{work.v_theta.get(), state.v.get()});
+  const std::vector<double>&position = motion[0], &velocity = motion[1];
+  StepProblem problem{free_contact_velocity(one, {position, velocity, state.slip}, Bv_free), {}};
+  std::vector<ContactStatus> before =
+      status_with(interface, law_before, factors.drive_start, state.reactions, velocity);
+  hold_anchors(interface, position, before, work.anchors);
+  lead_back(one, position, work.anchors, problem.free);
+  for (std::size_t i = 0; i < before.size(); ++i) // slip positions have no velocity of the step's start
+    if (slip_compliance_of(interface, i) > 0) before[i] = ContactStatus::stick;
+  problem.past =
+      past_sliding(PairView(velocity, interface.directions), TangentView<const double>(drive, interface.directions),
+                   before, (1 - step.theta) / step.theta);
+  return problem;
 }
 
 std::vector<double> sum(const std::vector<double>& a, const std::vector<double>& b)
@@ -134,59 +124,45 @@ double fall_at_pairs(const ContactOperator& W, const PairFriction& friction, con
   return largest;
 }
 
-/// Solves the problem of trajectory k; returns whether it is to be solved again, with less past sliding.
-bool solve_once(const StepBatch& batch, StepProblem& problem, std::size_t k)
+/// Solves the problem; returns whether it is to be solved again, with less past sliding.
+bool solve_once(const OneStep& one, StepProblem& problem)
 {
-  const auto& [step, interface, factors, works, states, reports] = batch;
+  const auto& [step, interface, factors, work, state, report] = one;
   const std::vector<double> b = sum(problem.free, problem.past);
   const PairFriction law = law_of_step(
       sliding_on(scaled(interface, factors.friction), PairView<const double>(problem.past, interface.directions)),
       step.theta);
-  const ContactResult result = solve_contact(step.W, law, step.contact, {b, states[k].reactions, works[k].memory});
-  StepReport& report = reports[k];
+  const ContactResult result = solve_contact(step.W, law, step.contact, {b, state.reactions, work.memory});
   report.contact_iterations += result.iterations;
   report.contact_residual = result.residual;
   report.contact_converged = result.converged;
   report.contact_as_one = report.contact_as_one || result.as_one;
-  report.fall_of_friction = fall_at_pairs(step.W, law, states[k].reactions);
-  const std::vector<double> w = sum(works[k].memory.Wr.front(), b);
-  if (works[k].record) works[k].record->contact_velocity = w;
-  return leave_out_where_turned(PairView<const double>(states[k].reactions, interface.directions),
+  report.fall_of_friction = fall_at_pairs(step.W, law, state.reactions);
+  const std::vector<double> w = sum(work.memory.Wr.front(), b);
+  if (work.record) work.record->contact_velocity = w;
+  return leave_out_where_turned(PairView<const double>(state.reactions, interface.directions),
                                 PairView(w, interface.directions), PairView(problem.past, interface.directions));
 }
 
 /// Gives every rank what rank 0 found, in one message: latency counts on small models. Collective.
 /// Error on every rank: `problem`, unless it is empty.
-void share_from_rank_zero(const StepBatch& batch, const std::string& problem)
+void share_from_rank_zero(const OneStep& one, const std::string& problem)
 {
-  const MPI_Comm comm = comm_of(batch.interface.B);
-  const std::size_t size = batch.interface.size(), length = size + 5;
-  std::vector<double> message(1 + length * batch.states.size());
-  message[0] = problem.empty() ? 0 : 1;
-  for (std::size_t k = 0; k < batch.states.size(); ++k)
-  {
-    const StepReport& report = batch.reports[k];
-    double* const entries = &message[1 + k * length];
-    entries[0] = report.contact_iterations;
-    entries[1] = report.contact_residual;
-    entries[2] = report.contact_converged ? 1 : 0;
-    entries[3] = report.fall_of_friction;
-    entries[4] = report.contact_as_one ? 1 : 0;
-    std::copy(batch.states[k].reactions.begin(), batch.states[k].reactions.end(), entries + 5);
-  }
+  const MPI_Comm comm = comm_of(one.interface.B);
+  StepReport& report = one.report;
+  std::vector<double> message{problem.empty() ? 0. : 1., static_cast<double>(report.contact_iterations),
+                              report.contact_residual,   report.contact_converged ? 1. : 0.,
+                              report.fall_of_friction,   report.contact_as_one ? 1. : 0.};
+  const auto head = static_cast<std::ptrdiff_t>(message.size());
+  message.insert(message.end(), one.state.reactions.begin(), one.state.reactions.end());
   MPI_Bcast(message.data(), to_int(message.size()), MPI_DOUBLE, 0, comm);
   if (message[0] != 0) agree(comm, problem);
-  for (std::size_t k = 0; k < batch.states.size(); ++k)
-  {
-    StepReport& report = batch.reports[k];
-    const double* const entries = &message[1 + k * length];
-    report.contact_iterations = static_cast<int>(entries[0]);
-    report.contact_residual = entries[1];
-    report.contact_converged = entries[2] != 0;
-    report.fall_of_friction = entries[3];
-    report.contact_as_one = entries[4] != 0;
-    std::copy_n(entries + 5, size, batch.states[k].reactions.begin());
-  }
+  report.contact_iterations = static_cast<int>(message[1]);
+  report.contact_residual = message[2];
+  report.contact_converged = message[3] != 0;
+  report.fall_of_friction = message[4];
+  report.contact_as_one = message[5] != 0;
+  one.state.reactions.assign(message.begin() + head, message.end());
 }
 
 /// What the tangent needs of the contact just solved, on every rank; `past` is rank 0's. Collective.
@@ -207,16 +183,15 @@ void record_contact(const Interface& interface, const State& state, const std::v
     record.gap[i] += PairView(position, interface.directions).normal(i);
 }
 
-/// Solves contact of all trajectories on rank 0, or on the ranks that share W. Returns the text of an error.
-std::string solve_all(const StepBatch& batch, std::vector<StepProblem>& problems)
+/// Solves contact on rank 0, or on the ranks that share W. Returns the text of an error.
+std::string solve(const OneStep& one, StepProblem& problem)
 {
-  if (batch.step.W.shared_by() == MPI_COMM_NULL && rank_of(comm_of(batch.interface.B)) != 0) return {};
+  if (one.step.W.shared_by() == MPI_COMM_NULL && rank_of(comm_of(one.interface.B)) != 0) return {};
   try
   {
-    for (std::size_t k = 0; k < problems.size(); ++k)
-      while (solve_once(batch, problems[k], k))
-      {
-      }
+    while (solve_once(one, problem))
+    {
+    }
   }
   catch (const std::exception& error)
   {
@@ -248,14 +223,12 @@ std::vector<ContactStatus> status_with(const Interface& interface, const PairFri
   return contact_status(PairView(reactions, interface.directions), PairView(velocity, interface.directions), friction);
 }
 
-void find_reactions(const StepBatch& batch, std::vector<double> Bv_free)
+void find_reactions(const OneStep& one, std::vector<double> Bv_free)
 {
-  if (const MPI_Comm sharing = batch.step.W.shared_by(); sharing != MPI_COMM_NULL) broadcast(Bv_free, sharing);
-  std::vector<StepProblem> problems = make_problems(batch, Bv_free);
-  share_from_rank_zero(batch, solve_all(batch, problems));
-  for (std::size_t k = 0; k < problems.size(); ++k)
-    if (StepRecord* const record = batch.works[k].record)
-      record_contact(batch.interface, batch.states[k], problems[k].past, *record);
+  if (const MPI_Comm sharing = one.step.W.shared_by(); sharing != MPI_COMM_NULL) broadcast(Bv_free, sharing);
+  StepProblem problem = make_problem(one, Bv_free);
+  share_from_rank_zero(one, solve(one, problem));
+  if (one.work.record) record_contact(one.interface, one.state, problem.past, *one.work.record);
 }
 
 } // namespace squeal

@@ -5,15 +5,15 @@
 namespace squeal
 {
 
-/// Trajectories that one step advances together.
-struct StepBatch
+/// A step of a trajectory.
+struct OneStep
 {
   const ThetaStep& step;
   const Interface& interface;
   const StepFactors& factors;
-  std::span<StepWork> works;
-  std::span<State> states;
-  std::span<StepReport> reports;
+  StepWork& work;
+  State& state;
+  StepReport& report;
 };
 
 /// The laws with the coefficients of driven pairs times a factor. Joints keep theirs, which hold the structure
@@ -25,8 +25,8 @@ PairFriction scaled(const Interface& interface, double factor);
 std::vector<ContactStatus> status_with(const Interface& interface, const PairFriction& friction, double drive,
                                        const std::vector<double>& reactions, std::vector<double> velocity);
 
-/// Reactions at the end of the step, into the states of every rank, and what the reports say of contact. `Bv_free`: B v
-/// of the steps without reactions, one trajectory after the other, on rank 0. Overwrites v_theta. Collective.
-void find_reactions(const StepBatch& batch, std::vector<double> Bv_free);
+/// Reactions at the end of the step, into the state of every rank, and what the report says of contact. `Bv_free`: B v
+/// of the step without reactions, on rank 0. Overwrites v_theta. Collective.
+void find_reactions(const OneStep& one, std::vector<double> Bv_free);
 
 } // namespace squeal

@@ -45,9 +45,9 @@ Factors factors_of_works(const ThetaStep& step, const Structure& structure, cons
 }
 
 /// h v_d . r_t over the pairs, v_d its mean over the step by theta.
-double drive_work(const StepBatch& batch, const State& state)
+double drive_work(const OneStep& one)
 {
-  const auto& [step, interface, factors, works, states, reports] = batch;
+  const auto& [step, interface, factors, work, state, report] = one;
   const PairView reactions(state.reactions, interface.directions);
   const TangentView drive(interface.drive, interface.directions);
   double sum = 0;
@@ -57,65 +57,59 @@ double drive_work(const StepBatch& batch, const State& state)
 
 /// h r.B v_theta over the undriven pairs of each contact: what friction takes, and shocks. Empty without such pairs.
 /// Collective.
-std::vector<double> joint_work(const StepBatch& batch, const State& state, Vec v_theta)
+std::vector<double> joint_work(const OneStep& one)
 {
   std::vector<double> work;
-  const Interface& interface = batch.interface;
+  const Interface& interface = one.interface;
   if (!has_undriven_pairs(interface)) return work;
-  const std::vector<double> velocity = relative(interface, v_theta);
+  const std::vector<double> velocity = relative(interface, one.work.v_theta);
   for (std::size_t i = 0; i < interface.gap.size(); ++i)
   {
     if (!is_undriven(interface, i)) continue;
     const std::size_t contact = interface.friction.contact_of(i);
     work.resize(std::max(work.size(), contact + 1));
-    work[contact] += batch.step.h * dot(PairView(state.reactions, interface.directions).of(i),
-                                        PairView(velocity, interface.directions).of(i));
+    work[contact] += one.step.h * dot(PairView(one.state.reactions, interface.directions).of(i),
+                                      PairView(velocity, interface.directions).of(i));
   }
   return work;
 }
 
 /// Moves the slip positions of pairs that do not stick, to those at u_theta. Collective.
-void move_slip(const StepBatch& batch, const std::vector<ContactStatus>& statuses, StepWork& work, State& state)
+void move_slip(const OneStep& one, const std::vector<ContactStatus>& statuses)
 {
+  const auto& [step, interface, factors, work, state, report] = one;
   if (state.slip.empty()) return;
-  check(VecWAXPY(work.f, -batch.step.h * (1 - batch.step.theta), work.v_theta, state.u)); // u_theta
-  const std::vector<double> moved = slip_positions(batch.interface, work.f, state.reactions);
-  const PairView<double> slip(state.slip, batch.interface.directions);
+  check(VecWAXPY(work.f, -step.h * (1 - step.theta), work.v_theta, state.u)); // u_theta
+  const std::vector<double> moved = slip_positions(interface, work.f, state.reactions);
+  const PairView<double> slip(state.slip, interface.directions);
   for (std::size_t i = 0; i < statuses.size(); ++i)
-    if (statuses[i] != ContactStatus::stick) slip.set(i, PairView(moved, batch.interface.directions).vector(i));
+    if (statuses[i] != ContactStatus::stick) slip.set(i, PairView(moved, interface.directions).vector(i));
 }
 
 /// Work of what no load factor scales. Collective.
-double preload_work(const StepBatch& batch, const Structure& structure, Vec v_theta)
+double preload_work(const OneStep& one, const Structure& structure)
 {
-  if (!structure.preload.get() || batch.factors.load == 1) return 0;
-  return batch.step.h * (1 - batch.factors.load) * dot(structure.preload, v_theta);
+  if (!structure.preload.get() || one.factors.load == 1) return 0;
+  return one.step.h * (1 - one.factors.load) * dot(structure.preload, one.work.v_theta);
 }
 
-/// Works of each step from the products at both ends; all reductions in one message.
-void account(const StepBatch& batch, const Structure& structure)
+/// Works of the step from the products at both ends; all reductions in one message.
+void account(const OneStep& one, const Structure& structure)
 {
-  const auto& [step, interface, step_factors, works, states, reports] = batch;
-  std::vector<Factors> factors;
-  std::vector<std::array<double, 7>> products(states.size());
-  for (std::size_t k = 0; k < states.size(); ++k)
-    factors.push_back(factors_of_works(step, structure, states[k], works[k]));
-  for (std::size_t k = 0; k < states.size(); ++k)
-    for (std::size_t i = 0; i < 7; ++i) check(VecDotBegin(factors[k][i].first, factors[k][i].second, &products[k][i]));
-  for (std::size_t k = 0; k < states.size(); ++k)
-  {
-    for (std::size_t i = 0; i < 7; ++i) check(VecDotEnd(factors[k][i].first, factors[k][i].second, &products[k][i]));
-    const auto [kinetic, potential, contact, load, damping, dMd, dKd] = products[k];
-    StepReport& report = reports[k];
-    report.energy = (kinetic + potential) / 2;
-    report.damping_work = damping / step.theta;
-    report.contact_work = contact;
-    report.load_work = step.h * step_factors.load * load + preload_work(batch, structure, works[k].v_theta);
-    report.drive_work = drive_work(batch, states[k]);
-    report.joint_work = joint_work(batch, states[k], works[k].v_theta);
-    report.energy_defect = report.energy - works[k].energy - (0.5 - step.theta) * (dMd + step.h * dKd) +
-                           report.damping_work - contact - report.load_work;
-  }
+  const auto& [step, interface, step_factors, work, state, report] = one;
+  const Factors factors = factors_of_works(step, structure, state, work);
+  std::array<double, 7> products{};
+  for (std::size_t i = 0; i < 7; ++i) check(VecDotBegin(factors[i].first, factors[i].second, &products[i]));
+  for (std::size_t i = 0; i < 7; ++i) check(VecDotEnd(factors[i].first, factors[i].second, &products[i]));
+  const auto [kinetic, potential, contact, load, damping, dMd, dKd] = products;
+  report.energy = (kinetic + potential) / 2;
+  report.damping_work = damping / step.theta;
+  report.contact_work = contact;
+  report.load_work = step.h * step_factors.load * load + preload_work(one, structure);
+  report.drive_work = drive_work(one);
+  report.joint_work = joint_work(one);
+  report.energy_defect = report.energy - work.energy - (0.5 - step.theta) * (dMd + step.h * dKd) + report.damping_work -
+                         contact - report.load_work;
 }
 
 /// The start of a step: A v_free = [M v - (1-theta) A v]/theta - h K u + h F, into A v_next. `factor`: on F, but for
@@ -138,64 +132,33 @@ void record_rates(const ThetaStep& step, const StepWork& work)
   check(VecAXPBY(record.force, -step.theta, 1 / step.h, work.Ku));
 }
 
-/// Adds h B'r of the reactions to A v+, and keeps it in f; returns -h r of one trajectory after the other.
-std::vector<double> apply_reactions(const StepBatch& batch)
+/// Adds h B'r of the reactions to A v+, and keeps it in f; returns -h r.
+std::vector<double> apply_reactions(const OneStep& one)
 {
+  StepWork& work = one.work;
+  check(VecSet(work.f, 0));
+  add_reactions(one.interface, one.state.reactions, work.f);
+  check(VecScale(work.f, one.step.h));
+  check(VecAXPY(work.Av_next, 1, work.f));
   std::vector<double> lambda;
-  for (std::size_t k = 0; k < batch.states.size(); ++k)
-  {
-    StepWork& work = batch.works[k];
-    check(VecSet(work.f, 0));
-    add_reactions(batch.interface, batch.states[k].reactions, work.f);
-    check(VecScale(work.f, batch.step.h));
-    check(VecAXPY(work.Av_next, 1, work.f));
-    for (const double reaction : batch.states[k].reactions) lambda.push_back(-batch.step.h * reaction);
-  }
+  for (const double reaction : one.state.reactions) lambda.push_back(-one.step.h * reaction);
   return lambda;
 }
 
-/// v+ and v_theta of every trajectory from A v_free in Av_next, with contact; Av_next becomes A v+.
-void solve_step(const StepBatch& batch)
+/// v+ and v_theta from A v_free in Av_next, with contact; Av_next becomes A v+.
+void solve_step(const OneStep& one)
 {
-  const auto& [step, interface, factors, works, states, reports] = batch;
-  std::vector<Vec> right, next;
-  for (StepWork& work : works)
-  {
-    right.push_back(work.Av_next);
-    next.push_back(work.v_next);
-  }
-  const std::vector<double> Bv_free = step.factor.forward(right);
+  const auto& [step, interface, factors, work, state, report] = one;
+  const Vec right = work.Av_next, next = work.v_next;
+  const std::vector<double> Bv_free = step.factor.forward(std::span(&right, 1));
   std::vector<double> lambda;
   if (interface.pairs > 0)
   {
-    find_reactions(batch, Bv_free);
-    lambda = apply_reactions(batch);
+    find_reactions(one, Bv_free);
+    lambda = apply_reactions(one);
   }
-  step.factor.backward(lambda, next);
-  for (std::size_t k = 0; k < states.size(); ++k)
-    check(VecAXPBYPCZ(works[k].v_theta, step.theta, 1 - step.theta, 0, works[k].v_next, states[k].v));
-}
-
-/// Solves the step with the gyroscopic part; contact is solved in each pass from where the step began.
-void solve_step_with_gyroscopic_part(const StepBatch& batch, Mat G)
-{
-  const auto& [step, interface, factors, works, states, reports] = batch;
-  SteppedMotions motions;
-  std::vector<std::pair<std::vector<double>, ContactMemory>> begun;
-  for (std::size_t k = 0; k < states.size(); ++k)
-  {
-    motions.v.push_back(states[k].v);
-    motions.v_next.push_back(works[k].v_next);
-    motions.Av.push_back(works[k].Av_next);
-    begun.emplace_back(states[k].reactions, works[k].memory);
-  }
-  solve_with_gyroscopic_part(step, G, motions,
-                             [&]
-                             {
-                               for (std::size_t k = 0; k < states.size(); ++k)
-                                 std::tie(states[k].reactions, works[k].memory) = begun[k];
-                               solve_step(batch);
-                             });
+  step.factor.backward(lambda, std::span(&next, 1));
+  check(VecAXPBYPCZ(work.v_theta, step.theta, 1 - step.theta, 0, next, state.v));
 }
 
 /// Whether the gyroscopic part needs another pass: `change` of h G v_theta over A v+ in the last one, `before` in the
@@ -341,67 +304,51 @@ StepFactors step_factors(const Ramps& ramps, const ThetaStep& step, double time)
   return factors;
 }
 
-std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                                std::span<StepWork> works, std::span<State> states)
-{
-  return advance(step, structure, interface, {}, works, states);
-}
-
-std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                                const StepFactors& factors, std::span<StepWork> works, std::span<State> states)
-{
-  const double h = step.h;
-  std::vector<StepReport> reports(states.size());
-  std::vector<Vec> next;
-  for (StepWork& work : works)
-  {
-    load_free_step(step, structure, factors.load, work);
-    next.push_back(work.v_next);
-  }
-  const StepBatch batch{step, interface, factors, works, states, reports};
-  if (structure.G.get())
-    solve_step_with_gyroscopic_part(batch, structure.G);
-  else
-    solve_step(batch);
-  std::vector<Vec> u, Mv, Ku;
-  for (std::size_t k = 0; k < states.size(); ++k)
-  {
-    StepWork& work = works[k];
-    check(VecAXPY(states[k].u, h, work.v_theta));
-    u.push_back(states[k].u);
-    Mv.push_back(work.Mv_next);
-    Ku.push_back(work.Ku_next);
-  }
-  multiply_mass_and_stiffness(step, structure, {next, u}, {Mv, Ku});
-  account(batch, structure);
-  const PairFriction friction = scaled(interface, factors.friction);
-  for (std::size_t k = 0; k < states.size(); ++k)
-  {
-    StepWork& work = works[k];
-    std::vector<double> velocity;
-    if (depends_on_speed(friction)) velocity = relative(interface, work.v_next);
-    const std::vector<ContactStatus> statuses =
-        status_with(interface, friction, factors.drive_end, states[k].reactions, std::move(velocity));
-    for (const ContactStatus status : statuses)
-      ++(status == ContactStatus::open    ? reports[k].open
-         : status == ContactStatus::stick ? reports[k].stick
-                                          : reports[k].slip);
-    move_slip(batch, statuses, work, states[k]);
-    if (work.record) record_rates(step, work);
-    check(VecCopy(work.v_next, states[k].v));
-    std::swap(work.Mv, work.Mv_next);
-    std::swap(work.Av, work.Av_next);
-    std::swap(work.Ku, work.Ku_next);
-    work.energy = reports[k].energy;
-    states[k].time += h;
-  }
-  return reports;
-}
-
 StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
                    State& state)
 {
-  return advance(step, structure, interface, std::span(&work, 1), std::span(&state, 1))[0];
+  return advance(step, structure, interface, {}, work, state);
+}
+
+StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                   const StepFactors& factors, StepWork& work, State& state)
+{
+  StepReport report;
+  const OneStep one{step, interface, factors, work, state, report};
+  load_free_step(step, structure, factors.load, work);
+  if (structure.G.get())
+  {
+    // contact is solved in each pass from where the step began
+    const auto begun = std::pair{state.reactions, work.memory};
+    solve_with_gyroscopic_part(step, structure.G, {{state.v}, {work.v_next}, {work.Av_next}},
+                               [&]
+                               {
+                                 std::tie(state.reactions, work.memory) = begun;
+                                 solve_step(one);
+                               });
+  }
+  else
+    solve_step(one);
+  check(VecAXPY(state.u, step.h, work.v_theta));
+  const Vec next = work.v_next, u = state.u, Mv = work.Mv_next, Ku = work.Ku_next;
+  multiply_mass_and_stiffness(step, structure, {std::span(&next, 1), {&u, 1}}, {std::span(&Mv, 1), {&Ku, 1}});
+  account(one, structure);
+  const PairFriction friction = scaled(interface, factors.friction);
+  std::vector<double> velocity;
+  if (depends_on_speed(friction)) velocity = relative(interface, work.v_next);
+  const std::vector<ContactStatus> statuses =
+      status_with(interface, friction, factors.drive_end, state.reactions, std::move(velocity));
+  for (const ContactStatus status : statuses)
+    ++(status == ContactStatus::open ? report.open : status == ContactStatus::stick ? report.stick : report.slip);
+  move_slip(one, statuses);
+  if (work.record) record_rates(step, work);
+  check(VecCopy(work.v_next, state.v));
+  std::swap(work.Mv, work.Mv_next);
+  std::swap(work.Av, work.Av_next);
+  std::swap(work.Ku, work.Ku_next);
+  work.energy = report.energy;
+  state.time += step.h;
+  return report;
 }
 
 } // namespace squeal

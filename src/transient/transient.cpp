@@ -275,8 +275,7 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     const auto next = static_cast<std::size_t>(summary.steps);
     work.record = next < records.size() ? &records[next] : nullptr;
     const StepFactors factors = ramps ? step_factors(*ramps, step, state.time) : StepFactors{};
-    const StepReport report =
-        advance(step, structure, interface, factors, std::span(&work, 1), std::span(&state, 1))[0];
+    const StepReport report = advance(step, structure, interface, factors, work, state);
     ++summary.steps;
     if (!report.contact_converged && summary.unconverged++ == 0) summary.first_unconverged = state.time;
     summary.contact_residual_max = std::max(summary.contact_residual_max, report.contact_residual);

@@ -131,34 +131,6 @@ TEST_CASE("in free flight every theta follows its discrete eigenvalue exactly")
   }
 }
 
-TEST_CASE("trajectories stepped together follow those stepped alone, through contact and free flight")
-{
-  const auto model = test::unilateral_oscillator(0.3, 0.6);
-  const ThetaStep step = make_theta_step(model.structure, model.interface, 0.015, 0.5, {});
-  std::vector<State> together, alone;
-  std::vector<StepWork> works;
-  for (const double scale : {0.1, 1., 3.})
-    for (std::vector<State>* states : {&together, &alone})
-      states->push_back(state_of(model.structure, {scale, -0.5, -0.5}, {0, scale, 0}));
-  for (State& state : together) works.push_back(begin_steps(step, model.structure, model.interface, state));
-  int open = 0;
-  for (int i = 0; i < 500; ++i)
-    for (const StepReport& report : advance(step, model.structure, model.interface, works, together))
-    {
-      open += report.open;
-      CHECK(std::abs(report.energy_defect) < 1e-12 * std::max(1., report.energy));
-    }
-  CHECK(open > 50);
-  for (std::size_t k = 0; k < alone.size(); ++k)
-  {
-    CHECK(test::run_steps(model, step, 500, alone[k]) == 0);
-    check(VecAXPY(together[k].u, -1, alone[k].u));
-    double distance = 0;
-    check(VecNorm(together[k].u, NORM_INFINITY, &distance));
-    CHECK(distance < 1e-12); // the same arithmetic, column by column
-  }
-}
-
 TEST_CASE("a trajectory is the same by every kind of factor, through contact and free flight")
 {
   const auto model = test::unilateral_oscillator(0.3, 0.6);

@@ -48,8 +48,7 @@ Moved move(const SmallModel& model, const Ramps& ramps, double end, int steps, d
   Moved moved;
   for (int i = 0; i < steps; ++i)
   {
-    const StepReport report = advance(step, structure, interface, step_factors(ramps, step, state.time),
-                                      std::span(&work, 1), std::span(&state, 1))[0];
+    const StepReport report = advance(step, structure, interface, step_factors(ramps, step, state.time), work, state);
     REQUIRE(report.contact_converged);
     moved.energy = report.energy;
     moved.load += report.load_work;

@@ -81,16 +81,4 @@ struct AttractorProblem
 /// to end it throws Interrupted.
 Attractors find_attractors(const AttractorProblem& problem);
 
-// The starts from which motions are sought.
-
-struct NamedStart
-{
-  std::string name;
-  State state;
-};
-
-/// Each unstable mode at its estimate, pairs of them, and random sums of modes up to the number asked for; behind them
-/// the small motion, where it is asked for.
-std::vector<NamedStart> make_starts(const AttractorProblem& problem);
-
 } // namespace squeal

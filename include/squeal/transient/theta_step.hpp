@@ -157,17 +157,13 @@ struct StepReport
   std::vector<double> joint_work; // [J] of the undriven pairs of each contact; empty: there are none
 };
 
-/// One step in place of several trajectories: each reading of the factor serves them all.
-std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                                std::span<StepWork> works, std::span<State> states);
-
-/// The same with factors on load, drive and friction.
-std::vector<StepReport> advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                                const StepFactors& factors, std::span<StepWork> works, std::span<State> states);
-
-/// Of one.
+/// One step in place.
 StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
                    State& state);
+
+/// The same with factors on load, drive and friction.
+StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                   const StepFactors& factors, StepWork& work, State& state);
 
 // The exact tangent of theta steps along a recorded motion (src/README.md, section 4.13).
 //
