@@ -340,19 +340,22 @@ bool steps_may_decide(const MotionSearch& search)
   const SettledBySteps now = by_steps(settled);
   if (const std::optional<SettledBySteps>& before = search.by_fewer_steps)
     return before->kind != now.kind || !alike(before->energy, now.energy) || !alike(before->exponent, now.exponent);
-  return now.kind == MotionKind::irregular || now.kind == MotionKind::undecided || depends_on_steps(settled);
+  return now.kind != MotionKind::quasi_periodic || depends_on_steps(settled); // nor a cycle that shooting missed
 }
 
-/// Notes what the motion settled on, and takes four times the steps a period; false where the search has ended.
+/// Notes what the motion settled on, and takes four times the steps a period; false where the search has ended. A kind
+/// of the last two numbers of steps stands, and the change of the energy between them is its error.
 bool takes_finer_steps(MotionSearch& search)
 {
   constexpr int finest = 1024;
   SettledMotion& settled = search.found.settled;
   if (search.ended || !steps_may_decide(search)) return false;
   search.begin_steps = finer * search.found.cycle.steps_per_period;
-  search.by_fewer_steps = by_steps(settled);
+  const SettledBySteps now = by_steps(settled), unknown{MotionKind::undecided, now.energy, {}},
+                       before = std::exchange(search.by_fewer_steps, now).value_or(unknown);
   if (search.begin_steps <= finest) return true;
-  leave_to_finer_steps(settled);
+  settled.step_error = std::max(settled.step_error, std::abs(now.energy.value - before.energy.value));
+  if (before.kind != now.kind) leave_to_finer_steps(settled);
   return false;
 }
 

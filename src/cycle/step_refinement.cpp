@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 namespace squeal
@@ -14,12 +15,12 @@ namespace squeal
 namespace
 {
 
-constexpr int most_corrections = 40; // periods of the full model while the steps a period are refined
+constexpr int most_corrections = 60; // periods of the full model while the steps a period are refined
 
-/// For errors that fall with this power of the steps: the error at c steps over the difference between a and b steps.
-double error_fraction(int a, int b, int c, double order)
+/// Of errors of order 2: the error at c steps over the difference between a and b steps.
+double error_fraction(int a, int b, int c)
 {
-  return std::pow(c, -order) / (std::pow(a, -order) - std::pow(b, -order));
+  return std::pow(c, -2) / (std::pow(a, -2) - std::pow(b, -2));
 }
 
 double largest(const RelativeChange& errors)
@@ -27,33 +28,24 @@ double largest(const RelativeChange& errors)
   return std::max(errors.frequency, errors.energy);
 }
 
-/// The relative error of a cycle's quantity at n steps a period: first/n + second/n^2.
-struct StepError
+/// The relative error of the last cycle's quantity, from its change since each of the others. Errors of order 2 fall
+/// alike, or depend on where in their steps pairs stick and open, so that the largest counts. Impacts have errors of
+/// order 1, which all changes show.
+double step_error(const std::vector<CycleAtSteps>& cycles, double CycleAtSteps::*quantity)
 {
-  double first = 0, second = 0;
-
-  double at(double steps) const { return (first + second / steps) / steps; }
-
-  /// The number of steps with such an error.
-  double steps_for(double error) const { return (first + std::sqrt(first * first + 4 * error * second)) / (2 * error); }
-
-  /// Of the power of n with which the error falls there: 1 to 2.
-  double order(double steps) const { return std::log2(at(steps) / at(2 * steps)); }
-};
-
-/// Of the last three cycles, a parabola in 1/n. Impacts and onsets of stick have errors of first order, which depend on
-/// where in their steps they come: two cycles may agree by chance. So both terms count by their size. Of two cycles, an
-/// error of the order given.
-StepError step_error(const std::vector<CycleAtSteps>& cycles, double CycleAtSteps::*quantity, int order)
-{
-  const CycleAtSteps &fine = cycles.back(), &middle = cycles[cycles.size() - 2];
-  const auto slope = [&](const CycleAtSteps& a, const CycleAtSteps& b)
-  { return (a.*quantity / (fine.*quantity) - b.*quantity / (fine.*quantity)) / (1. / a.steps - 1. / b.steps); };
-  const double sum = 1. / middle.steps + 1. / fine.steps, last = slope(middle, fine);
-  if (cycles.size() == 2) return order == 1 ? StepError{std::abs(last), 0} : StepError{0, std::abs(last / sum)};
-  const CycleAtSteps& coarse = cycles[cycles.size() - 3];
-  const double second = (slope(coarse, middle) - last) / (1. / coarse.steps - 1. / fine.steps);
-  return {std::abs(last - second * sum), std::abs(second)};
+  constexpr double alike = 1.5;
+  const CycleAtSteps& last = cycles.back();
+  double first = HUGE_VAL, least = HUGE_VAL, most = 0;
+  for (const CycleAtSteps& other : std::span(cycles).first(cycles.size() - 1))
+  {
+    const double change = std::abs(other.*quantity / (last.*quantity) - 1),
+                 ratio = static_cast<double>(other.steps) / last.steps,
+                 second = change * ratio * ratio / std::abs(1 - ratio * ratio);
+    first = std::min(first, change * ratio / std::abs(1 - ratio));
+    least = std::min(least, second);
+    most = std::max(most, second);
+  }
+  return cycles.size() > 2 && most <= alike * least ? alike * most : std::max(first, most);
 }
 
 CycleAtSteps at_steps(const LimitCycle& cycle)
@@ -67,8 +59,10 @@ struct FineShooting
   CycleProblem& problem;
   CycleOptions options; // without a verdict, which the last cycle alone is given
   double accuracy = 0;
+  bool exact = false; // the iteration's steps
 
-  /// Shoots until what further steps would change is below half of the accuracy.
+  /// Shoots until what further steps would change is below half of the accuracy. Where the steps are exact it is below
+  /// a twentieth, unless that stalls: cycles on two grids are compared.
   LimitCycle cycle_near(const Owned<Vec>& state, double period, int steps, const Convergence& before)
   {
     const int own = std::exchange(problem.settings.steps_per_period, steps);
@@ -76,8 +70,37 @@ struct FineShooting
     start.is_cycle = true;
     const Finally restore([&] { problem.settings.steps_per_period = own; });
     const int free_periods = has_undriven_pairs(problem.sliding.interface) ? 1 : 0; // until none slips one way
-    return find_cycle_from(problem, options, start,
-                           {0, free_periods, accuracy / 2, false, "cycle, finer steps", before});
+    const auto search = [&](double error, const Convergence& past) {
+      return find_cycle_from(problem, options, start, {0, free_periods, error, false, "cycle, finer steps", past});
+    };
+    LimitCycle cycle = search(exact ? accuracy / 20 : accuracy / 2, before);
+    if (!exact || cycle.ending != StageEnding::stalled) return cycle;
+    const Orbit stalled = std::move(cycle.orbit);
+    start.u = displacement(stalled.state);
+    start.v = velocity(stalled.state);
+    start.period = stalled.period;
+    return search(accuracy / 2, cycle.convergence);
+  }
+
+  /// Whether a motion that starts on the cycle leaves it at `steps` steps a period: in the end it comes back less near
+  /// than at first, and not as near as motions beside a cycle are watched. Adds its periods.
+  bool is_left(LimitCycle& cycle, int steps)
+  {
+    constexpr int seen = 20;
+    constexpr double beside = 0.03; // of the fluctuation; contact within steps scatters a motion that stays by less
+    PeriodMap map{problem.sliding, problem.step, steps, cycle.theta};
+    map.reactions = problem.sliding.equilibrium.reactions;
+    const Flow flow = flow_of(map);
+    const OrbitProblem free_motion =
+        problem_of(flow, {}, {problem.sliding.equilibrium.u, nullptr, nullptr, cycle.orbit.period}, 0);
+    Progress progress(comm_of(problem.sliding.equilibrium.u), "cycle, finer steps", seen);
+    ConvergenceLog log{progress, std::move(cycle.convergence)};
+    const Vec state = cycle.orbit.state;
+    const double period = cycle.orbit.period;
+    const double first = return_residual(free_motion, evaluate(free_motion, log, state, period));
+    const Orbit free = integrate_free_periods(free_motion, log, state, period, {seen});
+    cycle.convergence = std::move(log.convergence);
+    return !(return_residual(free_motion, free) <= std::max(first, beside));
   }
 
   /// The changes of a cycle on a grid of time that begins half a step later; none where no cycle is found there. Adds
@@ -125,17 +148,18 @@ void take(LimitCycle finer, const RelativeChange& step_errors, FittedCycle& foun
 }
 
 /// From the cycle at few steps a period to twice as many and on. Where the cycles agree, so must the last one on a
-/// moved grid: those of several numbers of steps may agree by chance. The state of the next one is extrapolated from
-/// the last two.
+/// moved grid: those of several numbers of steps may agree by chance. Where the steps of the iteration are exact, four
+/// times as many steps a period must know the cycle, too: at fewer a grid may hold a cycle that attracts nothing else.
+/// The state of the next one is extrapolated from the last two.
 void refine(FineShooting& shooting, FittedCycle& found)
 {
   constexpr int most_tries = 6;
   const double accuracy = shooting.accuracy;
-  const bool exact = whole_tangent_is_cheap(2. * dofs_of(found.cycle.orbit.state)); // steps
   LimitCycle& cycle = found.cycle;
   std::vector<CycleAtSteps> cycles{at_steps(cycle)};
   Orbit before = copy_of(cycle.orbit);
   double beyond = 0; // how far past the last cycle, on the line from the one before it
+  bool accurate = false;
   for (int tries = 1, steps = 2 * cycle.steps_per_period;; ++tries)
   {
     const Owned<Vec> start = std::move(before.state);
@@ -146,11 +170,12 @@ void refine(FineShooting& shooting, FittedCycle& found)
     if (finer.outcome.kind != OutcomeKind::converged)
     {
       cycle.convergence = std::move(finer.convergence);
-      found.fidelity.reason = format("the accuracy was not reached in %ld periods of the full model at more steps a "
-                                     "period",
-                                     cycle.convergence.periods);
-      if (tries == 1 && (finer.ending != StageEnding::stalled || exact))
+      if (finer.ending != StageEnding::stalled || shooting.is_left(cycle, steps))
         leave(cycle, shooting.problem.sliding.equilibrium.u);
+      if (!accurate)
+        found.fidelity.reason = format("the accuracy was not reached in %ld periods of the full model at more steps a "
+                                       "period",
+                                       cycle.convergence.periods);
       return;
     }
     cycles.push_back(at_steps(finer));
@@ -159,20 +184,18 @@ void refine(FineShooting& shooting, FittedCycle& found)
     if (largest(errors) <= accuracy / 2) of_grid = shooting.changes_on_moved_grid(finer);
     errors = {std::max(errors.frequency, of_grid.frequency), std::max(errors.energy, of_grid.energy)};
     take(std::move(finer), errors, found);
-    if (largest(errors) <= accuracy / 2) return;
-    if (tries == most_tries)
+    const bool confirmed = accurate || !shooting.exact;
+    accurate = largest(errors) <= accuracy / 2;
+    if (accurate && confirmed) return;
+    if (tries >= most_tries && !accurate)
     {
       found.fidelity.reason = format("the accuracy needs more than %d steps a period", steps);
       return;
     }
-    const StepError of_period = step_error(cycles, &CycleAtSteps::period, 2),
-                    of_energy = step_error(cycles, &CycleAtSteps::energy, 2);
-    const double needed = std::max({of_period.steps_for(accuracy / 3), of_energy.steps_for(accuracy / 3),
-                                    steps * largest(of_grid) / (accuracy / 3)}); // events have errors of first order
+    const double needed = steps * (accurate ? 4 : std::sqrt(largest(errors) / (accuracy / 3)));
     const int now =
         std::exchange(steps, 4 * static_cast<int>(std::ceil(std::clamp(needed, 1.5 * steps, 4. * steps) / 4)));
-    const double order = of_energy.order(now);
-    beyond = error_fraction(last, now, now, order) - error_fraction(last, now, steps, order);
+    beyond = error_fraction(last, now, now) - error_fraction(last, now, steps);
   }
 }
 
@@ -187,9 +210,7 @@ void cut_short(FittedCycle& found)
 
 RelativeChange step_errors_of(const std::vector<CycleAtSteps>& cycles)
 {
-  const int steps = cycles.back().steps;
-  return {step_error(cycles, &CycleAtSteps::period, 1).at(steps),
-          step_error(cycles, &CycleAtSteps::energy, 1).at(steps)};
+  return {step_error(cycles, &CycleAtSteps::period), step_error(cycles, &CycleAtSteps::energy)};
 }
 
 void refine_steps(CycleProblem& problem, const CycleOptions& options, FittedCycle& found)
@@ -198,7 +219,8 @@ void refine_steps(CycleProblem& problem, const CycleOptions& options, FittedCycl
   const int coarse = cycle.steps_per_period;
   try
   {
-    FineShooting shooting{problem, options, found.fidelity.accuracy};
+    FineShooting shooting{problem, options, found.fidelity.accuracy,
+                          whole_tangent_is_cheap(2. * dofs_of(cycle.orbit.state))};
     shooting.options.shooting.multipliers = 0;
     shooting.options.shooting.max_periods = cycle.convergence.periods + most_corrections;
     refine(shooting, found);
@@ -217,6 +239,7 @@ void refine_steps(CycleProblem& problem, const CycleOptions& options, FittedCycl
   Verdict verdict = examine(problem, options, cycle);
   if (verdict.cut_short) return cut_short(found);
   refuse_repelling(verdict, problem.unstable.modes.size() - 1, cycle.outcome);
+  if (cycle.outcome.kind != OutcomeKind::converged) cycle.steps_per_period = 2 * coarse; // of the motion that goes on
   cycle.multipliers = std::move(verdict.floquet.multipliers);
   found.fidelity.verdict_steps = judged;
 }

@@ -18,7 +18,7 @@ struct CycleAtSteps
   double period = 0, energy = 0; // [s], [J]
 };
 
-/// Errors of the last of two cycles, of first order, or of the last of three and more, of both orders.
+/// Errors of the last of two cycles, of first order, or of the last of more, of the order that all of them show.
 RelativeChange step_errors_of(const std::vector<CycleAtSteps>& cycles);
 
 } // namespace squeal

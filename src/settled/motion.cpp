@@ -156,11 +156,12 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
                                   [](const MeanValue& one) { return std::abs(one.value) <= together * one.error; });
   if (positive > 0) return judge_irregular(energies);
   const bool one_frequency = base.second == 0 || base.closes_after > 0;
-  if (zero == 1 && (one_frequency || parted(exponents, together))) return {MotionKind::periodic, "", ""};
-  if (zero == 1) return {MotionKind::undecided, "a cycle and an irregular motion: the exponents' bars overlap", more};
   // slow motions that die out have exponents within their bars of zero, too; of a torus whose parts hardly know of each
   // other the energies are as steady, and the second frequency tells
-  if (zero > 1 && steady(energies) && one_frequency) return {MotionKind::periodic, "", ""};
+  if ((zero == 1 && (base.second == 0 || parted(exponents, together))) ||
+      (zero > 0 && steady(energies) && one_frequency))
+    return {MotionKind::periodic, "", ""};
+  if (zero == 1) return {MotionKind::undecided, "a cycle and an irregular motion: the exponents' bars overlap", more};
   if (zero == 2) return judge_torus(energies, base);
   if (zero == 0) return {MotionKind::undecided, "a cycle and rest: no exponent is zero within its bar", more};
   return {MotionKind::undecided, "quasi-periodic with more than two frequencies and weakly irregular",

@@ -210,6 +210,7 @@ TEST_CASE("an exponent that is zero within a wide bar makes no cycle of a motion
                                narrow = {{0.0005, 0.001}, {-0.01, 0.002}, {-1, 0.1}};
   CHECK(judge_motion(wide, energies, base).kind == MotionKind::undecided);
   CHECK(judge_motion(wide, energies, {1, 0, 0, 1}).kind == MotionKind::periodic);
+  CHECK(judge_motion(wide, energies, {1, 1.5, 2, 1}).kind == MotionKind::undecided); // two rounds that differ in energy
   CHECK(judge_motion(narrow, energies, base).kind == MotionKind::periodic);
 }
 
