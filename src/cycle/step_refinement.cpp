@@ -91,8 +91,9 @@ struct FineShooting
     PeriodMap map{problem.sliding, problem.step, steps, cycle.theta};
     map.reactions = problem.sliding.equilibrium.reactions;
     const Flow flow = flow_of(map);
+    const Preconditioner none;
     const OrbitProblem free_motion =
-        problem_of(flow, {}, {problem.sliding.equilibrium.u, nullptr, nullptr, cycle.orbit.period}, 0);
+        problem_of(flow, none, {problem.sliding.equilibrium.u, nullptr, nullptr, cycle.orbit.period}, 0);
     Progress progress(comm_of(problem.sliding.equilibrium.u), "cycle, finer steps", seen);
     ConvergenceLog log{progress, std::move(cycle.convergence)};
     const Vec state = cycle.orbit.state;
