@@ -345,9 +345,12 @@ TEST_CASE("a track counts points, also where several modes of a design point hav
   report.sweep.outcome.kind = OutcomeKind::converged;
   for (const double growth : {5., -1.})
     report.sweep.points.push_back(
-        {.values = {100, 0.3},
-         .outcome = {OutcomeKind::converged, "", 0, 0},
-         .modes = {{.lambda = {growth, 600}, .track = 0, .mac = 0.9}, {.lambda = {-2, 700}, .track = 0, .mac = 0.1}}});
+        {{{100, 0.3}, false},
+         false,
+         {OutcomeKind::converged, "", 0, 0},
+         0,
+         0,
+         {{.lambda = {growth, 600}, .track = 0, .mac = 0.9}, {.lambda = {-2, 700}, .track = 0, .mac = 0.1}}});
   const Json sweep = Json::parse(report_json(report, scene))["sweep"];
   CHECK(sweep["unstable_tracks"][0]["points"] == 2);
   CHECK(sweep["unstable_tracks"][0]["unstable_points"] == 1);
