@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <Eigen/Dense>
 #include <limits>
 #include <type_traits>
 
@@ -18,6 +19,13 @@ namespace squeal
 
 namespace
 {
+
+/// A sweep that was made, or the difference of two in succession.
+template <class Entry> struct PastSweep
+{
+  std::vector<double> r, change; // after it, by it
+  std::vector<Entry> dw;         // after it
+};
 
 /// One problem while it is swept over. `Entry`: float for sweeps over the near field, double for sweeps over W.
 template <class Entry> struct SweptProblem
@@ -31,8 +39,9 @@ template <class Entry> struct SweptProblem
   bool finished = false; // the sweeps have met their target, or no reaction changes any more
   double exact_residual = std::numeric_limits<double>::infinity(); // at the last product with W
   double target = 0;                                               // residual at which the sweeps stop
-  double relaxation = 1;                                           // part of each local solution's change that is made
-  double residual_before = 0;                                      // 50 sweeps ago
+  PastSweep<Entry> last{};                                         // since the last product with W; empty: none
+  std::vector<PastSweep<Entry>> differences{};                     // of sweeps in succession
+  int swept = 0;                                                   // since the last product with W
   int failures = 0; // products with W in succession that did not halve the residual after finished sweeps
 
   /// work(pair) of all of this rank's.
@@ -72,9 +81,7 @@ template <class Entry> double visit(SweptProblem<Entry>& problem, std::size_t pa
   const double defect = defect_of(work, pair, w, largest);
   if (defect <= limit) return 0;
   const PairBlock& A = W.diagonal(pair);
-  PairVector next = solve_pair(A, velocity_without(A, last, w), W.directions(), work.friction.of(pair), last);
-  if (problem.relaxation < 1) // stays admissible: the cone is convex
-    for (std::size_t k = 0; k < next.size(); ++k) next[k] = last[k] + problem.relaxation * (next[k] - last[k]);
+  const PairVector next = solve_pair(A, velocity_without(A, last, w), W.directions(), work.friction.of(pair), last);
   return change_reaction(problem, pair, next) ? defect : 0;
 }
 
@@ -125,7 +132,10 @@ template <class Entry> Swept agree(const SweptProblem<Entry>& problem, bool move
 template <class Entry> void set_target(SweptProblem<Entry>& problem, const ContactSettings& settings)
 {
   const double digits = 32 * static_cast<double>(std::numeric_limits<Entry>::epsilon());
-  const double hidden = std::is_same_v<Entry, float> ? std::max(digits, ContactOperator::left_out / 4) : digits;
+  const double hidden = std::is_same_v<Entry, float>
+                            ? std::max(digits, (problem.differences.empty() ? ContactOperator::left_out / 4
+                                                                            : 2 * ContactOperator::left_out))
+                            : digits;
   problem.target = std::max(settings.tolerance / 4, hidden * problem.exact_residual);
 }
 
@@ -145,19 +155,58 @@ template <class Entry> bool continues(SweptProblem<Entry>& problem, double resid
   return problem.failures < 2;
 }
 
-template <class Entry> void shorten_changes(SweptProblem<Entry>& problem)
+template <class T> auto as_vector(const std::vector<T>& x)
 {
-  // with strong friction sweeps may repeat a cycle of reactions, which shorter changes often end
-  const double residual = problem.work.result.residual;
-  if (problem.residual_before > 0 && residual > 0.5 * problem.residual_before)
-    problem.relaxation = std::max(0.25, problem.relaxation / 2);
-  problem.residual_before = residual;
+  return Eigen::VectorX<T>::Map(x.data(), std::ssize(x));
+}
+
+/// x += part y
+template <class T> void add(double part, const std::vector<T>& y, std::vector<T>& x)
+{
+  Eigen::VectorX<T>::Map(x.data(), std::ssize(x)) += static_cast<T>(part) * as_vector(y);
+}
+
+/// Takes the past sweeps together that leave the least change (Anderson 1965). Light bodies between contacts, as shims,
+/// pass forces on slowly by sweeps alone. Pairs that this leaves outside their cone are solved by the next sweep.
+template <class Entry> void combine(SweptProblem<Entry>& problem, const std::vector<double>& before)
+{
+  constexpr std::size_t kept = 10;
+  constexpr double astray = 10; // growth of the change by a combination
+  std::vector<double>& r = problem.work.r;
+  std::vector<PastSweep<Entry>>& differences = problem.differences;
+  PastSweep<Entry> now{r, r, problem.dw};
+  add(-1, before, now.change);
+  const Eigen::VectorXd change = as_vector(now.change);
+  PastSweep<Entry> last = std::exchange(problem.last, now);
+  if (!last.r.empty() && change.norm() > astray * as_vector(last.change).norm())
+    differences.clear();
+  else if (!last.r.empty())
+  {
+    add(-1, last.r, now.r);
+    add(-1, last.change, now.change);
+    add(-1, last.dw, now.dw);
+    differences.push_back(std::move(now));
+    if (differences.size() > kept) differences.erase(differences.begin());
+  }
+  Eigen::MatrixXd changes(std::ssize(r), std::ssize(differences));
+  for (Eigen::Index j = 0; j < changes.cols(); ++j)
+    changes.col(j) = as_vector(differences[static_cast<std::size_t>(j)].change);
+  Eigen::MatrixXd products = changes.transpose() * changes;
+  products.diagonal() *= 1 + 1e-12;
+  const Eigen::VectorXd part = products.ldlt().solve(-changes.transpose() * change);
+  for (std::size_t j = 0; j < differences.size(); ++j)
+  {
+    add(part[static_cast<Eigen::Index>(j)], differences[j].r, r);
+    add(part[static_cast<Eigen::Index>(j)], differences[j].dw, problem.dw);
+  }
 }
 
 /// Sweeps over all pairs. Returns whether to sweep on before a product with W.
 template <class Entry> bool sweep_once(SweptProblem<Entry>& problem, const ContactSettings& settings)
 {
+  constexpr int plain = 4; // sweeps that most problems take
   const Scales largest = largest_reactions(problem.work);
+  const std::vector<double> before = problem.work.r;
   ContactResult& result = problem.work.result;
   bool moved = false;
   for (const Turn& turn : problem.turns)
@@ -168,11 +217,13 @@ template <class Entry> bool sweep_once(SweptProblem<Entry>& problem, const Conta
   }
   const Swept swept = agree(problem, moved);
   result.residual = swept.residual;
-  const bool due = ++result.iterations % 50 == 0;
+  const bool due = ++problem.swept == 50;
+  ++result.iterations;
   problem.changed = problem.changed || swept.moved > 0;
-  if (due) shorten_changes(problem);
   problem.finished = !(result.residual > problem.target) || swept.moved == 0;
-  return !problem.finished && !due && result.iterations < settings.max_iterations;
+  if (problem.finished || due || result.iterations >= settings.max_iterations) return false;
+  if (result.iterations > plain) combine(problem, before);
+  return true;
 }
 
 /// Makes the start admissible: a warm start need not be, nor finite after a failed step. Where that changes reactions,
@@ -200,6 +251,8 @@ template <class Entry> void update_product(SweptProblem<Entry>& problem)
 {
   if (!problem.changed) return;
   problem.changed = false;
+  problem.last = {};
+  problem.swept = 0;
   std::fill(problem.dw.begin(), problem.dw.end(), Entry{0});
   if constexpr (std::is_same_v<Entry, float>)
     form_product(problem.work);

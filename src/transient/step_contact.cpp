@@ -125,14 +125,14 @@ double fall_at_pairs(const ContactOperator& W, const PairFriction& friction, con
 }
 
 /// Solves the problem; returns whether it is to be solved again, with less past sliding.
-bool solve_once(const OneStep& one, StepProblem& problem)
+bool solve_once(const OneStep& one, const ContactSettings& settings, StepProblem& problem)
 {
   const auto& [step, interface, factors, work, state, report] = one;
   const std::vector<double> b = sum(problem.free, problem.past);
   const PairFriction law = law_of_step(
       sliding_on(scaled(interface, factors.friction), PairView<const double>(problem.past, interface.directions)),
       step.theta);
-  const ContactResult result = solve_contact(step.W, law, step.contact, {b, state.reactions, work.memory});
+  const ContactResult result = solve_contact(step.W, law, settings, {b, state.reactions, work.memory});
   report.contact_iterations += result.iterations;
   report.contact_residual = result.residual;
   report.contact_converged = result.converged;
@@ -183,15 +183,31 @@ void record_contact(const Interface& interface, const State& state, const std::v
     record.gap[i] += PairView(position, interface.directions).normal(i);
 }
 
+/// Solves the problem, again where pairs turned. Which ones do is told loosely where joints take many sweeps.
+void solve_again(const OneStep& one, StepProblem& problem)
+{
+  ContactMemory& memory = one.work.memory;
+  ContactSettings loose = one.step.contact;
+  loose.tolerance = std::max(loose.tolerance, 1e-4);
+  bool again = has_undriven_pairs(one.interface);
+  if (again) solve_once(one, loose, problem);
+  for (bool first = !again; first || again; first = false)
+  {
+    again = solve_once(one, one.step.contact, problem);
+    if (first) continue;
+    // the solution before is none of the past
+    memory.r.erase(memory.r.begin() + 1);
+    memory.Wr.erase(memory.Wr.begin() + 1);
+  }
+}
+
 /// Solves contact on rank 0, or on the ranks that share W. Returns the text of an error.
 std::string solve(const OneStep& one, StepProblem& problem)
 {
   if (one.step.W.shared_by() == MPI_COMM_NULL && rank_of(comm_of(one.interface.B)) != 0) return {};
   try
   {
-    while (solve_once(one, problem))
-    {
-    }
+    solve_again(one, problem);
   }
   catch (const std::exception& error)
   {

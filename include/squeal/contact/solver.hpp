@@ -7,7 +7,7 @@
 /// gauss_seidel: one exact local solve a pair and sweep. w follows each change of a reaction; pairs that no longer
 /// move are passed over. A large W is swept over through its near field, in single precision, by several ranks side by
 /// side: each then learns what the others changed. One product with W between sweeps and the verdict closes the
-/// residual. Where that does not help, the sweeps read W itself. Under-relaxed when 50 sweeps bring nothing.
+/// residual. Where that does not help, the sweeps read W itself. From the fifth on they are combined (Anderson).
 /// fixed_point: the paper's r_n <- max(0, r_n - rho w_n), r_t <- proj_disc(mu r_n)(r_t - rho w_t). It contracts without
 /// friction for 0 < rho < 2/lambda_max(W), at a rate set by cond(W).
 ///
