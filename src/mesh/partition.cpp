@@ -94,26 +94,11 @@ std::vector<int> partition_graph(Graph graph, int ranks)
   return rank;
 }
 
-/// Returns the most frequent value, the smallest of several.
-int most_frequent(std::vector<int> values)
-{
-  std::sort(values.begin(), values.end());
-  int best = values.front();
-  std::ptrdiff_t most = 0;
-  for (auto it = values.begin(); it != values.end();)
-  {
-    const auto end = std::upper_bound(it, values.end(), *it);
-    if (end - it > most) most = end - it, best = *it;
-    it = end;
-  }
-  return best;
-}
-
 } // namespace
 
 Partition partition_mesh(const Mesh& mesh, const std::vector<ContactPair>& pairs, int ranks)
 {
-  Partition partition{std::vector<int>(mesh.nodes.size()), std::vector<int>(mesh.elements.size())};
+  Partition partition{std::vector<int>(mesh.nodes.size())};
   if (ranks == 1) return partition;
   const std::size_t nodes = mesh.nodes.size();
   if (nodes < static_cast<std::size_t>(ranks))
@@ -124,12 +109,6 @@ Partition partition_mesh(const Mesh& mesh, const std::vector<ContactPair>& pairs
   std::iota(owner.begin(), owner.end(), 0); // used as it is where pairs leave fewer vertices than ranks
   if (vertices.count >= ranks) owner = partition_graph(node_graph(mesh, vertices), ranks);
   for (std::size_t i = 0; i < nodes; ++i) partition.node_rank[i] = owner[vertices.of_node[i]];
-  for (std::size_t e = 0; e < mesh.elements.size(); ++e)
-  {
-    std::vector<int> owners;
-    for (const int node : nodes_of(mesh.elements[e])) owners.push_back(partition.node_rank[node]);
-    partition.element_rank[e] = most_frequent(owners);
-  }
   return partition;
 }
 

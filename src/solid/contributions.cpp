@@ -217,14 +217,26 @@ std::vector<PetscInt> nodal_dofs_of(std::span<const int> nodes, int components)
   return result;
 }
 
+std::vector<std::size_t> elements_here(const NumberedMesh& numbered)
+{
+  const DofMap& dofs = numbered.dofs;
+  const auto is_here = [&](const DofTerm& term) { return term.dof >= dofs.first && term.dof < dofs.last; };
+  std::vector<std::size_t> here;
+  for (std::size_t i = 0; i < numbered.mesh.elements.size(); ++i)
+    if (std::ranges::any_of(nodal_dofs_of(numbered.mesh.elements[i]),
+                            [&](PetscInt own) { return std::ranges::any_of(dofs.terms_of(own), is_here); }))
+      here.push_back(i);
+  return here;
+}
+
 void for_each_contribution(const NumberedMesh& numbered, const Scene& scene, MPI_Comm comm,
-                           const std::function<void(const Contribution&)>& visit)
+                           const std::function<void(const Contribution&, AddedRows)>& visit)
 {
   const auto visit_own = [&]
   {
-    for (std::size_t i = 0; i < numbered.mesh.elements.size(); ++i)
-      if (numbered.partition.element_rank[i] == rank_of(comm)) visit(element_contribution(numbered, scene, i));
-    if (rank_of(comm) == 0) std::ranges::for_each(lumped_contributions(numbered.mesh, scene), visit);
+    for (const std::size_t i : elements_here(numbered)) visit(element_contribution(numbered, scene, i), AddedRows::own);
+    if (rank_of(comm) != 0) return;
+    for (const Contribution& lumped : lumped_contributions(numbered.mesh, scene)) visit(lumped, AddedRows::all);
   };
   on_every_rank(comm, visit_own);
 }
@@ -234,19 +246,15 @@ std::vector<PetscInt> nodal_dofs_of(const Element& element)
   return nodal_dofs_of(nodes_of(element), dofs_per_node(element.shape));
 }
 
-std::vector<PetscInt> free_dofs(const DofMap& dofs, const std::vector<PetscInt>& nodal_dofs)
+LocalDofs local_dofs(const DofMap& dofs, const std::vector<PetscInt>& nodal_dofs, AddedRows added)
 {
-  std::vector<PetscInt> result;
+  LocalDofs local;
   for (const PetscInt nodal_dof : nodal_dofs)
-    for (const DofTerm& term : dofs.terms_of(nodal_dof)) result.push_back(term.dof);
-  std::sort(result.begin(), result.end());
-  result.erase(std::unique(result.begin(), result.end()), result.end());
-  return result;
-}
-
-LocalDofs local_dofs(const DofMap& dofs, const std::vector<PetscInt>& nodal_dofs)
-{
-  LocalDofs local{free_dofs(dofs, nodal_dofs), {}};
+    for (const DofTerm& term : dofs.terms_of(nodal_dof)) local.free.push_back(term.dof);
+  std::sort(local.free.begin(), local.free.end());
+  local.free.erase(std::unique(local.free.begin(), local.free.end()), local.free.end());
+  for (const PetscInt dof : local.free)
+    local.rows.push_back(added == AddedRows::all || (dof >= dofs.first && dof < dofs.last) ? dof : -1);
   for (std::size_t i = 0; i < nodal_dofs.size(); ++i)
     for (const DofTerm& term : dofs.terms_of(nodal_dofs[i]))
     {
@@ -264,13 +272,14 @@ void add_matrix(Mat matrix, const LocalDofs& local, const Eigen::MatrixXd& A)
   sum.setZero();
   for (const LocalTerm& t : local.terms) AT.col(t.free) += t.factor * A.col(t.nodal);
   for (const LocalTerm& t : local.terms) sum.row(t.free) += t.factor * AT.row(t.nodal);
-  check(MatSetValues(matrix, count, local.free.data(), count, local.free.data(), sum.data(), ADD_VALUES));
+  check(MatSetValues(matrix, count, local.rows.data(), count, local.free.data(), sum.data(), ADD_VALUES));
 }
 
 void add_vector(Vec vector, const LocalDofs& local, const Eigen::VectorXd& f)
 {
   for (const LocalTerm& t : local.terms)
-    check(VecSetValue(vector, local.free[static_cast<std::size_t>(t.free)], t.factor * f(t.nodal), ADD_VALUES));
+    if (const PetscInt row = local.rows[static_cast<std::size_t>(t.free)]; row >= 0)
+      check(VecSetValue(vector, row, t.factor * f(t.nodal), ADD_VALUES));
 }
 
 void finish(Mat A)

@@ -29,10 +29,20 @@ Contribution element_contribution(const NumberedMesh& numbered, const Scene& sce
 /// must be whole.
 std::vector<Contribution> lumped_contributions(const Mesh& mesh, const Scene& scene);
 
-/// Calls visit for every contribution that this rank adds: of its elements; of what is lumped on rank 0. Collective:
-/// what one throws all throw.
+/// The elements that add to rows of this rank, ascending.
+std::vector<std::size_t> elements_here(const NumberedMesh& numbered);
+
+/// Which rows of matrices and vectors a rank adds to.
+enum class AddedRows
+{
+  own, // of what every rank adds that it concerns: no sum then depends on the order of messages
+  all,
+};
+
+/// Calls visit for every contribution that this rank adds: of elements to its own rows; of what is lumped on rank 0 to
+/// all rows. Collective: what one throws all throw.
 void for_each_contribution(const NumberedMesh& numbered, const Scene& scene, MPI_Comm comm,
-                           const std::function<void(const Contribution&)>& visit);
+                           const std::function<void(const Contribution&, AddedRows)>& visit);
 
 /// Contributions of the elements of a beam, from end to end.
 std::vector<Contribution> beam_contributions(const Mesh& mesh, const Scene& scene, std::size_t index);
@@ -41,9 +51,6 @@ std::vector<Contribution> beam_contributions(const Mesh& mesh, const Scene& scen
 std::vector<PetscInt> nodal_dofs_of(std::span<const int> nodes, int components);
 
 std::vector<PetscInt> nodal_dofs_of(const Element& element);
-
-/// Returns the free degrees of freedom on which the nodal ones depend, ascending.
-std::vector<PetscInt> free_dofs(const DofMap& dofs, const std::vector<PetscInt>& nodal_dofs);
 
 /// An entry of T_e.
 struct LocalTerm
@@ -57,10 +64,11 @@ struct LocalTerm
 struct LocalDofs
 {
   std::vector<PetscInt> free; // ascending
+  std::vector<PetscInt> rows; // the same, -1 for those that are not added to
   std::vector<LocalTerm> terms;
 };
 
-LocalDofs local_dofs(const DofMap& dofs, const std::vector<PetscInt>& nodal_dofs);
+LocalDofs local_dofs(const DofMap& dofs, const std::vector<PetscInt>& nodal_dofs, AddedRows added);
 
 /// Adds T_e' A T_e; A of any symmetry.
 void add_matrix(Mat matrix, const LocalDofs& local, const Eigen::MatrixXd& A);

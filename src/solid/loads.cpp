@@ -80,7 +80,7 @@ void add_gravity_and_shift(Vec load, const NumberedMesh& numbered, const Scene& 
   const std::set<int> coordinates = coordinate_nodes(numbered.mesh);
   const DofMap& dofs = numbered.dofs;
   if (!dofs.shift.empty()) on_rank_zero(comm, [&] { check_moved(numbered, scene); });
-  const auto add = [&](const Contribution& of)
+  const auto add = [&](const Contribution& of, AddedRows added)
   {
     Eigen::VectorXd a = Eigen::VectorXd::Zero(of.M.rows());
     for (Eigen::Index k = 0; k < a.size(); ++k)
@@ -89,7 +89,7 @@ void add_gravity_and_shift(Vec load, const NumberedMesh& numbered, const Scene& 
       const bool falls = nodal_dof % 6 < 3 && !coordinates.contains(static_cast<int>(nodal_dof / 6));
       if (falls) a(k) = scene.gravity[static_cast<std::size_t>(nodal_dof % 6)];
     }
-    add_vector(load, local_dofs(dofs, of.nodal_dofs), of.M * a - of.K * shift_of(dofs, of.nodal_dofs));
+    add_vector(load, local_dofs(dofs, of.nodal_dofs, added), of.M * a - of.K * shift_of(dofs, of.nodal_dofs));
   };
   if (scene.gravity != Vec3{} || !dofs.shift.empty()) for_each_contribution(numbered, scene, comm, add);
 }
@@ -107,7 +107,7 @@ TightBolt bolt_of(const Bolt& bolt, const NumberedMesh& numbered, const Scene& s
     for (const auto& [of, shift] : cuts_of(bolt, numbered, scene))
     {
       const Eigen::VectorXd force = of.K * shift;
-      add_vector(result.pull, local_dofs(numbered.dofs, of.nodal_dofs), -force);
+      add_vector(result.pull, local_dofs(numbered.dofs, of.nodal_dofs, AddedRows::all), -force);
       result.stiffness += shift.dot(force);
       result.own += force.dot(shift_of(numbered.dofs, of.nodal_dofs));
     }

@@ -113,17 +113,16 @@ struct Spinning
   LocalDofs local;
 };
 
-std::vector<Spinning> spinning_elements(const NumberedMesh& numbered, const Scene& scene, int rank)
+std::vector<Spinning> spinning_elements(const NumberedMesh& numbered, const Scene& scene)
 {
-  const Mesh& mesh = numbered.mesh;
   std::vector<Spinning> result;
-  for (std::size_t i = 0; i < mesh.elements.size(); ++i)
+  for (const std::size_t i : elements_here(numbered))
   {
-    const Element& element = mesh.elements[i];
+    const Element& element = numbered.mesh.elements[i];
     const Part& part = scene.parts[static_cast<std::size_t>(element.part)];
-    if (!spins(part) || numbered.partition.element_rank[i] != rank) continue;
-    result.push_back(
-        {element, part, positions_of(mesh, nodes_of(element)), local_dofs(numbered.dofs, nodal_dofs_of(element))});
+    if (!spins(part)) continue;
+    result.push_back({element, part, positions_of(numbered.mesh, nodes_of(element)),
+                      local_dofs(numbered.dofs, nodal_dofs_of(element), AddedRows::own)});
   }
   return result;
 }
@@ -142,28 +141,23 @@ std::vector<double> displacements(const Structure& structure, Vec force)
   constexpr int passes = 50;
   constexpr double enough = 1e-6, rounding = 1e-13;
   const double size = norm_of(force, NORM_2);
-  double last = HUGE_VAL;
+  double now = size, last = HUGE_VAL;
   PencilFactor factor(structure.K, structure.M, Keep::factor, {});
   factor.factorise(-1e-8 * trace(structure.K) / trace(structure.M)); // below every eigenvalue of K x = theta M x
   const Owned<Vec> u = zeros_like(force), residual = zeros_like(force), change = zeros_like(force);
   check(VecCopy(force, residual));
-  for (int pass = 0; pass < passes; ++pass)
+  for (int pass = 0; pass < passes && now > rounding * size && now <= last / 2; ++pass)
   {
+    last = now;
     copy_column(factor.solve(columns_of(std::array<Vec, 1>{residual})), 0, change);
     check(VecAXPY(u, 1, change));
     check(MatMult(structure.K, u, residual));
     check(VecAYPX(residual, -1, force));
-    const double now = norm_of(residual, NORM_2);
-    if (now <= rounding * size || now > last / 2)
-    {
-      last = std::min(last, now);
-      break;
-    }
-    last = now;
+    now = norm_of(residual, NORM_2);
   }
-  if (!(last <= enough * size))
-    throw Error("rotation of parts: the centrifugal force is not balanced: the residual stays at " +
-                format("%.1e of it", last / size));
+  if (!(std::min(last, now) <= enough * size))
+    throw Error(format("rotation of parts: the centrifugal force is not balanced: the residual stays at %.1e of it",
+                       now / size));
   return all_entries(u);
 }
 
@@ -188,7 +182,7 @@ void add_spin(Structure& structure, const NumberedMesh& numbered, const Scene& s
       if (spins(scene.parts[i])) check_revolution(numbered.mesh, scene.parts[i], static_cast<int>(i));
   };
   on_rank_zero(comm, check_all);
-  const std::vector<Spinning> elements = spinning_elements(numbered, scene, rank_of(comm));
+  const std::vector<Spinning> elements = spinning_elements(numbered, scene);
 
   Owned<Mat> centrifugal;
   const Owned<Vec> force = vector_of_rows(structure.K);

@@ -1,8 +1,8 @@
 /// M, C, K and the load on the free degrees of freedom: sums of T_e' A_e T_e over contributions, u_e = T_e q.
 ///
-/// A contribution is that of an element, or lumped: a mass, spring, connector, beam or superelement. Contributions to
-/// rows of other ranks are sent at the end of the assembly. All three matrices receive every contribution, zeros
-/// included, which gives them one pattern.
+/// A contribution is that of an element, or lumped: a mass, spring, connector, beam or superelement. Every rank
+/// computes the elements that add to its rows. What is lumped is sent by rank 0 at the end of the assembly. All three
+/// matrices receive every contribution, zeros included, which gives them one pattern.
 #include "squeal/solid/structure.hpp"
 
 #include "contributions.hpp"
@@ -13,9 +13,9 @@ namespace squeal
 namespace
 {
 
-void add_contribution(const Structure& structure, const DofMap& dofs, const Contribution& contribution)
+void add_contribution(const Structure& structure, const DofMap& dofs, const Contribution& contribution, AddedRows added)
 {
-  const LocalDofs local = local_dofs(dofs, contribution.nodal_dofs);
+  const LocalDofs local = local_dofs(dofs, contribution.nodal_dofs, added);
   add_matrix(structure.M, local, contribution.M);
   add_matrix(structure.C, local, contribution.C);
   add_matrix(structure.K, local, contribution.K);
@@ -35,17 +35,17 @@ Owned<Mat> zero_matrix(const NumberedMesh& numbered, const Scene& scene, MPI_Com
     check(MatSetType(*matrix, type));
   }
   check(MatSetUp(pattern));
-  const auto add = [&](const std::vector<PetscInt>& nodal_dofs)
+  const auto add = [&](const std::vector<PetscInt>& nodal_dofs, AddedRows added)
   {
-    const std::vector<PetscInt> free = free_dofs(dofs, nodal_dofs);
-    const auto count = static_cast<PetscInt>(free.size());
-    check(MatSetValues(pattern, count, free.data(), count, free.data(), nullptr, INSERT_VALUES));
+    const LocalDofs local = local_dofs(dofs, nodal_dofs, added);
+    const auto count = static_cast<PetscInt>(local.free.size());
+    check(MatSetValues(pattern, count, local.rows.data(), count, local.free.data(), nullptr, INSERT_VALUES));
   };
-  for (std::size_t i = 0; i < numbered.mesh.elements.size(); ++i)
-    if (numbered.partition.element_rank[i] == rank_of(comm)) add(nodal_dofs_of(numbered.mesh.elements[i]));
+  for (const std::size_t i : elements_here(numbered)) add(nodal_dofs_of(numbered.mesh.elements[i]), AddedRows::own);
   const auto add_lumped = [&]
   {
-    for (const Contribution& lumped : lumped_contributions(numbered.mesh, scene)) add(lumped.nodal_dofs);
+    for (const Contribution& lumped : lumped_contributions(numbered.mesh, scene))
+      add(lumped.nodal_dofs, AddedRows::all);
   };
   on_rank_zero(comm, add_lumped);
   finish(pattern);
@@ -67,7 +67,8 @@ Structure assemble(const NumberedMesh& numbered, const Scene& scene, MPI_Comm co
   for (Owned<Mat>* A : {&structure.C, &structure.K}) *A = copy_of(structure.M);
   if (structure.loss_omega > 0) structure.K_loss = copy_of(structure.M);
   for_each_contribution(numbered, scene, comm,
-                        [&](const Contribution& contribution) { add_contribution(structure, dofs, contribution); });
+                        [&](const Contribution& contribution, AddedRows added)
+                        { add_contribution(structure, dofs, contribution, added); });
   for (Mat A : {structure.M.get(), structure.C.get(), structure.K.get(), structure.K_loss.get()})
   {
     if (!A) continue;

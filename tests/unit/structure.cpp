@@ -310,9 +310,13 @@ TEST_CASE("the matrices are allocated exactly, and an element that is inside out
     CHECK(info.nz_used == info.nz_allocated);
   }
   CHECK(built.structure.elements == static_cast<std::int64_t>(c.mesh.elements.size()));
-  const std::vector<int> owners = partition_mesh(c.mesh, {}, ranks_of(world)).element_rank;
-  const auto last = std::ranges::find(owners, ranks_of(world) - 1) - owners.begin(); // assembled by the last rank alone
-  auto& nodes = c.mesh.elements[static_cast<std::size_t>(last)].nodes;
+  const std::vector<int> owners = partition_mesh(c.mesh, {}, ranks_of(world)).node_rank;
+  const auto is_of_last_rank = [&](const Element& element)
+  { return std::ranges::all_of(nodes_of(element), [&](int node) { return owners[node] == ranks_of(world) - 1; }); };
+  const auto found = std::ranges::find_if(c.mesh.elements, is_of_last_rank); // assembled by that rank alone
+  REQUIRE(found != c.mesh.elements.end());
+  const auto last = found - c.mesh.elements.begin();
+  auto& nodes = found->nodes;
   std::swap(nodes[1], nodes[3]);
   const std::string named = "element " + std::to_string(last) + " with node " + std::to_string(nodes[0]) + " at";
   CHECK_THROWS_WITH_AS(build(c.mesh, c.scene, world), doctest::Contains(named.c_str()), Error);

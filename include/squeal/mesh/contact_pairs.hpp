@@ -1,6 +1,6 @@
 #pragma once
 /// Contact pairs of two surfaces whose meshes need not match (src/README.md, section 1.9). The distribution of nodes
-/// and elements over the ranks keeps pairs together.
+/// over the ranks keeps pairs together.
 #include "squeal/mesh/mesh.hpp"
 
 namespace squeal
@@ -48,11 +48,10 @@ struct ContactPairs
 /// nowhere within reach of each other, look the same way or are inside each other. The mesh must be whole.
 ContactPairs make_pairs(const Mesh& mesh, const Scene& scene);
 
-/// Owner of each node and of each element.
+/// Owner of each node.
 struct Partition
 {
   std::vector<int> node_rank;
-  std::vector<int> element_rank; // the rank that owns its first node
 };
 
 /// Returns a partition by METIS, the same at every call. The two heaviest nodes of a pair, one of each side, have the
