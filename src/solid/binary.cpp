@@ -120,20 +120,6 @@ bool is_computable(double value)
   return std::abs(value) <= largest_number; // false of NaN
 }
 
-/// Returns the entries of a vector after all checks of its file.
-std::vector<double> checked_vector(const std::filesystem::path& file)
-{
-  auto stream = open_file(file);
-  const std::int64_t length = read_header(stream, file, VEC_FILE_CLASSID, "vector", 1)[0];
-  if (length < 0) throw Error(file.string() + ": a vector of " + std::to_string(length));
-  check_length(file, static_cast<std::int64_t>(vector_header_size) + length * 8);
-  std::vector<double> values = read_big_endian<double>(stream, length);
-  const auto bad = std::ranges::find_if_not(values, is_computable);
-  if (bad != values.end())
-    throw Error(format("%s: entry %td is %g; %s", file.c_str(), bad - values.begin(), *bad, entries_expected));
-  return values;
-}
-
 /// Returns the message on the first entry of this rank's rows that is not computable; empty if there is none.
 std::string problem_of_entries(Mat A, const std::filesystem::path& file)
 {
@@ -181,21 +167,35 @@ Owned<Mat> load_matrix(const std::filesystem::path& file, MatrixSize size, Matri
 std::vector<double> read_vector(const std::filesystem::path& file, MPI_Comm comm)
 {
   std::vector<double> values;
-  on_rank_zero(comm, [&] { values = checked_vector(file); });
+  const auto read = [&]
+  {
+    std::vector<std::vector<double>> found = read_vectors(file);
+    if (found.size() != 1) throw Error(file.string() + format(": holds %zu vectors, not one", found.size()));
+    values = std::move(found.front());
+    const auto bad = std::ranges::find_if_not(values, is_computable);
+    if (bad != values.end())
+      throw Error(format("%s: entry %td is %g; %s", file.c_str(), bad - values.begin(), *bad, entries_expected));
+  };
+  on_rank_zero(comm, read);
   broadcast(values, comm);
   return values;
 }
 
-std::optional<PetscInt> read_vector_header(std::istream& stream)
+std::vector<std::vector<double>> read_vectors(const std::filesystem::path& file)
 {
-  const auto header = read_big_endian<Index>(stream, 2);
-  if (!stream || header[0] != VEC_FILE_CLASSID) return {};
-  return static_cast<PetscInt>(header[1]);
-}
-
-std::vector<double> read_vector_entries(std::istream& stream, PetscInt length)
-{
-  return read_big_endian<double>(stream, length);
+  auto stream = open_file(file);
+  const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(file));
+  std::vector<std::vector<double>> vectors;
+  while (vectors.empty() || stream.tellg() < bytes)
+  {
+    const std::int64_t length = read_header(stream, file, VEC_FILE_CLASSID, "vector", 1)[0];
+    if (length < 0) throw Error(file.string() + ": a vector of " + std::to_string(length));
+    if (const std::int64_t end = stream.tellg() + std::streamoff{8 * length}; end > bytes)
+      throw Error(file.string() + ": truncated: " + std::to_string(bytes) + " bytes where a header announces " +
+                  std::to_string(end) + " (real double precision)");
+    vectors.push_back(read_big_endian<double>(stream, length));
+  }
+  return vectors;
 }
 
 void append_vector(const std::vector<double>& entries, std::string& bytes)

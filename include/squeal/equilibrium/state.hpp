@@ -23,6 +23,9 @@ struct State
 /// A deep copy.
 State copy_of(const State& state);
 
+/// x'A y
+double product(Vec x, Mat A, Vec y);
+
 /// Scalar energies and norms in the structure's own inner product.
 double kinetic_energy(const Structure& structure, Vec v);   // v'Mv/2 [J]
 double potential_energy(const Structure& structure, Vec u); // u'Ku/2 [J]
@@ -54,8 +57,7 @@ public:
   void describe(Checkpoint& checkpoint, Vec x) const;
 
 private:
-  Owned<Vec> whole_; // on rank 0
-  Owned<VecScatter> scatter_;
+  std::vector<PetscInt> order_; // degrees of freedom in the order of files, on rank 0
 };
 
 } // namespace squeal

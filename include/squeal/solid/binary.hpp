@@ -7,8 +7,6 @@
 #include "squeal/solid/structure.hpp"
 
 #include <filesystem>
-#include <iosfwd>
-#include <optional>
 #include <vector>
 
 namespace squeal
@@ -30,15 +28,8 @@ Owned<Mat> load_matrix(const std::filesystem::path& file, MatrixSize size, Matri
 /// Returns all entries of a vector file on every rank. Throws Error as above.
 std::vector<double> read_vector(const std::filesystem::path& file, MPI_Comm comm);
 
-/// Size [byte] of the header of a vector: its class id and its length, which PETSc writes as two PetscInt.
-inline constexpr std::size_t vector_header_size = 2 * sizeof(PetscInt);
-
-/// Reads the header of a vector. Returns its length; none if there is no such header. Not collective, nor are the two
-/// below.
-std::optional<PetscInt> read_vector_header(std::istream& stream);
-
-/// Reads the entries behind a header.
-std::vector<double> read_vector_entries(std::istream& stream, PetscInt length);
+/// Returns the vectors that a file holds, one after the other. Throws Error as above. Not collective, nor is the next.
+std::vector<std::vector<double>> read_vectors(const std::filesystem::path& file);
 
 /// Appends a vector with its header.
 void append_vector(const std::vector<double>& entries, std::string& bytes);
