@@ -178,11 +178,7 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
     if (const auto place = static_cast<PetscInt>(interface.geometry.size()) - 1; place < first || place >= last)
       continue;
     axes.insert(axes.begin(), pair.normal);
-    for (const Vec3& axis : axes)
-    {
-      rows.emplace_back();
-      for (const auto& [node, weight] : pair.nodes) add_displacement(dofs, node, weight * axis, rows.back());
-    }
+    for (const Vec3& axis : axes) rows.push_back(displacement_row(dofs, pair.nodes, axis));
   }
   add_shifts(interface, scene, dofs, comm);
   interface.B = matrix_of_rows(rows, dofs.last - dofs.first, comm);

@@ -6,28 +6,23 @@ namespace squeal
 namespace
 {
 
-/// A matrix on the rows of B with what add_pair(pair, first row, set) sets for the closed pairs, `width` entries a row
-/// at most; null where all is zero. Collective.
+/// A matrix on the rows of B with what add_pair(pair, first row, set) sets for the closed pairs; null where all is
+/// zero. Collective.
 template <class AddPair>
-Owned<Mat> on_pair_rows(const Interface& interface, const std::vector<char>& closed, PetscInt width, AddPair add_pair)
+Owned<Mat> on_pair_rows(const Interface& interface, const std::vector<char>& closed, AddPair add_pair)
 {
   const PairRows<PetscInt> rows(interface.directions);
-  const IndexRange own = own_rows(interface.B);
-  Owned<Mat> result; // a pair may straddle ranks
-  check(MatCreateAIJ(comm_of(interface.B), own.size(), own.size(), PETSC_DETERMINE, PETSC_DETERMINE, width, nullptr,
-                     width, nullptr, result.put()));
-  bool any = false; // alike on every rank
+  const IndexRange range = own_rows(interface.B);
+  std::vector<SparseRow> own(static_cast<std::size_t>(range.size())); // a pair may straddle ranks
+  bool any = false;                                                   // alike on every rank
   const auto set = [&](PetscInt row, PetscInt column, double value)
   {
     any = any || value != 0;
-    if (value != 0 && own.holds(row)) check(MatSetValue(result, row, column, value, INSERT_VALUES));
+    if (value != 0 && range.holds(row)) own[static_cast<std::size_t>(row - range.first)][column] = value;
   };
   for (std::size_t i = 0; i < closed.size(); ++i)
     if (closed[i]) add_pair(i, rows.normal(static_cast<PetscInt>(i)), set);
-  if (!any) return {};
-  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
-  return result;
+  return any ? matrix_of_rows(own, last - first, comm_of(interface.B)) : Owned<Mat>();
 }
 
 } // namespace
@@ -47,7 +42,7 @@ Owned<Mat> stiffness_of_pairs(const Interface& interface, const std::vector<char
         set(normal + k, normal, mu[i] * e.of(i)[static_cast<std::size_t>(k - 1)] / c);
     }
   };
-  return on_pair_rows(interface, closed, 2, add_pair);
+  return on_pair_rows(interface, closed, add_pair);
 }
 
 Owned<Mat> contact_stiffness(const Interface& interface, const std::vector<char>& closed, PairForces part)
@@ -71,7 +66,7 @@ Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>&
       for (PetscInt l = 0; l < interface.directions; ++l)
         set(normal + 1 + k, normal + 1 + l, damping[static_cast<std::size_t>(k)][static_cast<std::size_t>(l)]);
   };
-  return on_pair_rows(interface, closed, interface.directions, add_pair);
+  return on_pair_rows(interface, closed, add_pair);
 }
 
 Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>& closed,
@@ -80,26 +75,6 @@ Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>&
   const Owned<Mat> damping = damping_of_pairs(interface, closed, reactions, part);
   if (!damping.get()) return {};
   return project(damping, interface.B, interface.B);
-}
-
-Owned<Mat> compliant_reactions(const Interface& interface, const std::vector<char>& closed)
-{
-  const PairRows<PetscInt> rows(interface.directions);
-  if (interface.compliance.empty()) return {};
-  Owned<Mat> choice, result;
-  check(MatCreateAIJ(comm_of(interface.B), PETSC_DECIDE, own_rows(interface.B).size(), interface.pairs, PETSC_DETERMINE,
-                     1, nullptr, 1, nullptr, choice.put()));
-  const auto [first, last] = own_rows(choice);
-  for (PetscInt pair = first; pair < last; ++pair)
-  {
-    const auto i = static_cast<std::size_t>(pair);
-    if (closed[i] && compliance_of(interface, i) > 0)
-      check(MatSetValue(choice, pair, rows.normal(pair), -1 / compliance_of(interface, i), INSERT_VALUES));
-  }
-  check(MatAssemblyBegin(choice, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(choice, MAT_FINAL_ASSEMBLY));
-  check(MatMatMult(choice, interface.B, MAT_INITIAL_MATRIX, PETSC_DEFAULT, result.put()));
-  return result;
 }
 
 } // namespace squeal

@@ -54,26 +54,17 @@ std::vector<HeldRow> held_rows(const Interface& interface, const std::vector<cha
 std::vector<Row> read_rows(const Interface& interface, const std::vector<HeldRow>& held)
 {
   const PairRows<PetscInt> rows(interface.directions);
-  struct Source
-  {
-    PetscInt row; // of B
-    std::size_t held;
-    PetscInt component;
-  };
-  std::vector<Source> sources;
+  constexpr std::size_t none = -1;
+  std::vector<std::size_t> held_of(interface.size(), none); // that a row of B is part of
   for (std::size_t i = 0; i < held.size(); ++i)
   {
     const auto [pair, component] = held[i];
     const PetscInt last = is_undriven(interface, static_cast<std::size_t>(pair)) ? component : rows.directions;
-    for (PetscInt k = component; k <= last; ++k) sources.push_back({rows.normal(pair) + k, i, k});
+    std::fill_n(held_of.begin() + rows.normal(pair) + component, last - component + 1, i);
   }
-  std::ranges::sort(sources, {}, &Source::row); // as PETSc needs them
-  std::vector<PetscInt> indices;
-  for (const Source& source : sources) indices.push_back(source.row);
-  const PetscInt dofs = column_count(interface.B);
+  const PetscInt pair_rows = row_count(interface.B), dofs = column_count(interface.B);
   Owned<IS> row_set, column_set;
-  check(ISCreateGeneral(PETSC_COMM_SELF, static_cast<PetscInt>(indices.size()), indices.data(), PETSC_COPY_VALUES,
-                        row_set.put()));
+  check(ISCreateStride(PETSC_COMM_SELF, pair_rows, 0, 1, row_set.put()));
   check(ISCreateStride(PETSC_COMM_SELF, dofs, 0, 1, column_set.put()));
   const IS wanted_rows = row_set, wanted_columns = column_set;
   Mat* parts = nullptr;
@@ -84,8 +75,10 @@ std::vector<Row> read_rows(const Interface& interface, const std::vector<HeldRow
   for_each_row(parts[0],
                [&](PetscInt row, std::span<const PetscInt> column, std::span<const PetscScalar> value)
                {
-                 const auto [of_B, i, component] = sources[static_cast<std::size_t>(row)];
+                 const std::size_t i = held_of[static_cast<std::size_t>(row)];
+                 if (i == none) return;
                  const auto pair = static_cast<std::size_t>(held[i].pair);
+                 const PetscInt component = rows.component_of(row);
                  const bool own = component == held[i].component; // else friction that follows the normal row
                  const double weight = own ? 1 : mu[pair] * e.of(pair)[static_cast<std::size_t>(component - 1)];
                  for (std::size_t j = 0; j < column.size(); ++j)
@@ -207,59 +200,23 @@ struct Elimination
 };
 
 // A row of Z or Y: du at `dof` from the kept degrees of freedom.
-void basis_row(const Elimination& elimination, PetscInt dof, double Coefficients::*kind, std::vector<PetscInt>& columns,
-               std::vector<double>& values)
+SparseRow basis_row(const Elimination& elimination, PetscInt dof, double Coefficients::*kind)
 {
-  columns.clear();
-  values.clear();
   const auto row = elimination.row_of.find(dof);
-  if (row == elimination.row_of.end())
-  {
-    columns.push_back(elimination.kept_before(dof));
-    values.push_back(1);
-    return;
-  }
+  if (row == elimination.row_of.end()) return {{elimination.kept_before(dof), 1}};
+  SparseRow result;
   for (const auto& [column, value] : elimination.rows[row->second])
-  {
-    if (column == dof || column >= elimination.dofs) continue;
-    columns.push_back(elimination.kept_before(column));
-    values.push_back(-(value.*kind));
-  }
+    if (column != dof && column < elimination.dofs) result[elimination.kept_before(column)] = -(value.*kind);
+  return result;
 }
 
 Owned<Mat> assemble_basis(const Elimination& elimination, double Coefficients::*kind, Mat pattern)
 {
   const auto [first, last] = own_rows(pattern);
-  const PetscInt first_column = elimination.kept_before(first), last_column = elimination.kept_before(last);
-  std::vector<PetscInt> columns, inside, outside;
-  std::vector<double> values;
-  for (PetscInt dof = first; dof < last; ++dof)
-  {
-    basis_row(elimination, dof, kind, columns, values);
-    inside.push_back(static_cast<PetscInt>(std::count_if(
-        columns.begin(), columns.end(), [&](PetscInt c) { return c >= first_column && c < last_column; })));
-    outside.push_back(static_cast<PetscInt>(columns.size()) - inside.back());
-  }
-  Owned<Mat> result;
-  check(MatCreateAIJ(comm_of(pattern), last - first, last_column - first_column, PETSC_DETERMINE, PETSC_DETERMINE, 0,
-                     inside.data(), 0, outside.data(), result.put()));
-  for (PetscInt dof = first; dof < last; ++dof)
-  {
-    basis_row(elimination, dof, kind, columns, values);
-    check(MatSetValues(result, 1, &dof, static_cast<PetscInt>(columns.size()), columns.data(), values.data(),
-                       INSERT_VALUES));
-  }
-  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
-  return result;
+  std::vector<SparseRow> rows;
+  for (PetscInt dof = first; dof < last; ++dof) rows.push_back(basis_row(elimination, dof, kind));
+  return matrix_of_rows(rows, elimination.kept_before(last) - elimination.kept_before(first), comm_of(pattern));
 }
-
-// The reactions that are asked for: of normal rows, or of tangential ones, by pairs and directions.
-enum class ReactionRows
-{
-  normal,
-  tangential,
-};
 
 // R'[pivots] lambda = f[pivots], and the elimination found T with T R[pivots] = I: lambda = T' f[pivots]. Likewise of
 // B_n.
@@ -268,25 +225,19 @@ Owned<Mat> assemble_reaction(const Elimination& elimination, double Coefficients
 {
   const std::vector<Row>& rows = elimination.rows;
   const bool normal = wanted == ReactionRows::normal;
-  const IndexRange own = own_columns(interface.B);
-  const PetscInt dofs = column_count(interface.B);
-  Owned<Mat> result;
-  check(MatCreate(comm_of(interface.B), result.put()));
-  check(MatSetSizes(result, PETSC_DECIDE, own.size(), interface.pairs * (normal ? 1 : interface.directions), dofs));
-  check(MatSetType(result, MATAIJ));
-  check(MatSetUp(result));
-  check(MatSetOption(result, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE)); // rows that share pivots fill in
+  const PetscInt dofs = elimination.dofs, of_a_pair = normal ? 1 : interface.directions;
+  const PetscInt dofs_here = own_columns(interface.B).size();
+  const auto [first, last] = local_range(interface.pairs * of_a_pair, comm_of(interface.B));
+  std::vector<SparseRow> own(static_cast<std::size_t>(last - first));
   for (const auto& [pivot, i] : elimination.row_of)
-    for (auto entry = rows[i].lower_bound(dofs); own.holds(pivot) && entry != rows[i].end(); ++entry)
+    for (auto entry = rows[i].lower_bound(dofs); entry != rows[i].end(); ++entry)
     {
       const auto [pair, component] = held[static_cast<std::size_t>(entry->first - dofs)];
       if ((component == 0) != normal) continue;
-      const PetscInt row = normal ? pair : pair * interface.directions + component - 1;
-      check(MatSetValue(result, row, pivot, entry->second.*kind, INSERT_VALUES));
+      const PetscInt row = normal ? pair : pair * of_a_pair + component - 1;
+      if (row >= first && row < last) own[static_cast<std::size_t>(row - first)][pivot] = entry->second.*kind;
     }
-  check(MatAssemblyBegin(result, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(result, MAT_FINAL_ASSEMBLY));
-  return result;
+  return matrix_of_rows(own, dofs_here, comm_of(interface.B));
 }
 
 } // namespace
@@ -350,15 +301,36 @@ Owned<Mat> project(Mat A, Mat Y, Mat Z)
   return result;
 }
 
-std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
-                                                   Vec imaginary)
+std::vector<std::complex<double>> reactions_of(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
+                                               ReactionRows rows, std::complex<double> s, Vec real, Vec imaginary)
 {
-  const Owned<Vec> re = vector_of_rows(reaction.K), im = vector_of_rows(reaction.K);
-  quadratic_residual({reaction.M, reaction.C, reaction.K}, s, {real, imaginary}, {re, im});
-  const std::vector<double> first = all_entries(re), second = all_entries(im);
-  std::vector<std::complex<double>> result;
-  for (std::size_t i = 0; i < first.size(); ++i) result.emplace_back(first[i], second[i]);
-  return result;
+  const auto& [structure, interface, equilibrium] = sliding;
+  const Mat K = linearised.K.get() ? linearised.K.get() : structure.K.get();
+  const Mat by = rows == ReactionRows::normal ? linearised.contact.reaction : linearised.contact.friction;
+  const Owned<Vec> re = zeros_like(real), im = zeros_like(real), result = vector_of_rows(by);
+  quadratic_residual({structure.M, linearised.C, K}, s, {real, imaginary}, {re, im});
+  const std::vector<double> compliance = compliance_of_rows(interface);
+  const auto rows_of = [&](const std::vector<double>& of, std::size_t pair)
+  {
+    const PairView view(of, interface.directions);
+    return rows == ReactionRows::normal ? view.of(pair).first(1) : view.tangential(pair);
+  };
+  const auto part_of = [&](Vec force, Vec motion)
+  {
+    check(MatMult(by, force, result));
+    std::vector<double> part = all_entries(result);
+    if (compliance.empty()) return part;
+    const std::vector<double> moved = relative(interface, motion);
+    for (std::size_t i = 0, at = 0; i < interface.gap.size(); ++i)
+      for (std::size_t k = 0; k < rows_of(moved, i).size(); ++k, ++at)
+        if (const double c = rows_of(compliance, i)[k]; c > 0 && equilibrium.closed[i])
+          part[at] = -rows_of(moved, i)[k] / c;
+    return part;
+  };
+  const std::vector<double> first = part_of(re, real), second = part_of(im, imaginary);
+  std::vector<std::complex<double>> reactions;
+  for (std::size_t i = 0; i < first.size(); ++i) reactions.emplace_back(first[i], second[i]);
+  return reactions;
 }
 
 Owned<Mat> sum_of(Mat A, Mat B)
@@ -411,12 +383,6 @@ LinearisedSliding linearise(const SlidingEquilibrium& sliding)
   if (const auto stiffness = contact_stiffness(interface, equilibrium.closed, PairForces::with_friction);
       stiffness.get())
     result.K = sum_of(result.K.get() ? result.K.get() : structure.K.get(), stiffness);
-  for (const auto& [A, rows] : {std::pair{structure.M.get(), &result.reaction.M},
-                                {result.C.get(), &result.reaction.C},
-                                {result.K.get() ? result.K.get() : structure.K.get(), &result.reaction.K}})
-    check(MatMatMult(result.contact.reaction, A, MAT_INITIAL_MATRIX, PETSC_DEFAULT, rows->put()));
-  if (const auto own = compliant_reactions(interface, equilibrium.closed); own.get())
-    check(MatAXPY(result.reaction.K, 1, own, DIFFERENT_NONZERO_PATTERN));
   result.M_z = project_symmetric(structure.M, result.contact.Z);
   const auto springs = contact_stiffness(interface, equilibrium.closed, PairForces::normal);
   const Owned<Mat> K = springs.get() ? sum_of(structure.K, springs) : Owned<Mat>();

@@ -238,9 +238,10 @@ void add_loss_reactions(const Structure& structure, const ClosedContact& contact
 }
 
 /// The modes of pairs that come with the largest real part first.
-std::vector<ComplexMode> modes_of(const QuadraticSolution& solution, const Structure& structure,
+std::vector<ComplexMode> modes_of(const QuadraticSolution& solution, const SlidingEquilibrium& sliding,
                                   const LinearisedSliding& linearised)
 {
+  const Structure& structure = sliding.structure;
   std::vector<ComplexMode> modes;
   for (const Eigenpair& pair : solution.pairs)
   {
@@ -248,7 +249,7 @@ std::vector<ComplexMode> modes_of(const QuadraticSolution& solution, const Struc
     mode.lambda = pair.lambda;
     mode.backward_error = pair.backward_error;
     set_shape(mode, linearised.contact, pair);
-    mode.reactions = normal_reactions(linearised.reaction, mode.lambda, mode.real, mode.imaginary);
+    mode.reactions = reactions_of(sliding, linearised, ReactionRows::normal, mode.lambda, mode.real, mode.imaginary);
     if (structure.K_loss.get() && mode.lambda.imag() > 0) add_loss_reactions(structure, linearised.contact, mode);
   }
   return modes;
@@ -344,7 +345,7 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
   const Owned<Mat> K_loss = sliding_loss(sliding.structure, linearised);
   const PairSearch found =
       search_pairs({reduced, K_loss, linearised.M_z, linearised.K_z}, settings.method, settings.band, options);
-  modes.modes = modes_of(found.solution, sliding.structure, linearised);
+  modes.modes = modes_of(found.solution, sliding, linearised);
   modes.outcome = found.solution.outcome;
   modes.count = count_pairs(found, std::sqrt(vibration_floor(norms_of(reduced))), 0.8 * two_pi * settings.band);
   if (modes.beyond_inertia) // where inertia does not count, a problem that is solved whole has all its pairs

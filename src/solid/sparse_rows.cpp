@@ -6,10 +6,16 @@
 namespace squeal
 {
 
-void add_displacement(const DofMap& dofs, int node, const Vec3& direction, SparseRow& row)
+SparseRow displacement_row(const DofMap& dofs, std::span<const PairNode> nodes, const Vec3& direction)
 {
-  for (int c = 0; c < 3; ++c)
-    for (const DofTerm& term : dofs.terms_of(6 * PetscInt{node} + c)) row[term.dof] += direction[c] * term.factor;
+  SparseRow row;
+  for (const auto& [node, weight] : nodes)
+    for (int c = 0; c < 3; ++c)
+      for (const DofTerm& term : dofs.terms_of(6 * PetscInt{node} + c))
+        row[term.dof] += weight * direction[c] * term.factor;
+  // direction cosines and lever arms [m] that cancelled up to round-off
+  std::erase_if(row, [](const auto& entry) { return std::abs(entry.second) < 1e-14; });
+  return row;
 }
 
 Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_columns, MPI_Comm comm)
@@ -20,7 +26,6 @@ Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_col
   {
     for (const auto& [column, value] : row)
     {
-      if (std::abs(value) < 1e-14) continue; // direction cosines and lever arms [m] that cancelled up to round-off
       columns.push_back(column);
       values.push_back(value);
     }
@@ -80,9 +85,9 @@ Owned<Mat> probe_rows(const std::vector<Probe>& probes, const Mesh& mesh, const 
   {
     for (const Probe& probe : probes)
     {
-      SparseRow& row = rows.emplace_back();
-      add_displacement(dofs, probed_node(probe, mesh), probe.direction, row);
-      if (std::all_of(row.begin(), row.end(), [](const auto& entry) { return entry.second == 0; }))
+      const PairNode at{probed_node(probe, mesh), 1};
+      rows.push_back(displacement_row(dofs, std::span(&at, 1), probe.direction));
+      if (rows.back().empty())
         throw Error("probe " + probe.name + ": the motion of " + probe.on +
                     " in its direction is held, so it would read 0");
     }

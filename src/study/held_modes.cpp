@@ -137,7 +137,7 @@ std::vector<HeldMode> unstable_modes(const SensitivityProblem& problem, Sensitiv
   constexpr double exact = 1e-10; // backward error
   constexpr double same = 1e-7;   // of lambda, which the modes have with their own tolerance
   const auto& [structure, interface, equilibrium] = problem.sliding;
-  const auto& [contact, C, K, reaction, M_z, K_z] = problem.linearised;
+  const auto& [contact, C, K, M_z, K_z] = problem.linearised;
   const QuadraticProblem matrices = sliding_problem(structure, problem.linearised);
   const Owned<Mat> K_loss = sliding_loss(structure, problem.linearised);
   TwoSidedProblem two_sided = make_two_sided(matrices, K_loss, K_z, M_z, problem.modes_options.pencil);

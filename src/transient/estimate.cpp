@@ -1,6 +1,5 @@
 #include "squeal/transient/estimate.hpp"
 
-#include "squeal/algebra/quadratic_residual.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
@@ -157,7 +156,8 @@ std::vector<PairMotion> pair_motions(const SlidingEquilibrium& sliding, const Li
   const Interface& interface = sliding.interface;
   const Equilibrium& equilibrium = sliding.equilibrium;
   const Complex s(0, mode.lambda.imag()); // the motion assumed neither grows nor decays, and its reactions are those
-  const std::vector<Complex> reactions = normal_reactions(linearised.reaction, s, mode.real, mode.imaginary);
+  const std::vector<Complex> reactions =
+      reactions_of(sliding, linearised, ReactionRows::normal, s, mode.real, mode.imaginary);
   const std::vector<double> e = drive_directions(interface), real = relative(interface, mode.real),
                             imaginary = relative(interface, mode.imaginary);
   const int directions = interface.directions;
@@ -220,23 +220,9 @@ std::vector<StuckPair> stuck_pairs(const SlidingEquilibrium& sliding, const Line
 {
   const auto& [structure, interface, equilibrium] = sliding;
   std::vector<StuckPair> pairs;
-  if (!equilibrium.history) return pairs;
-  const QuadraticMatrices matrices{structure.M, linearised.C,
-                                   linearised.K.get() ? linearised.K.get() : structure.K.get()};
-  const Owned<Vec> real = zeros_like(mode.real), imaginary = zeros_like(mode.real);
-  quadratic_residual(matrices, mode.lambda, {mode.real, mode.imaginary}, {real, imaginary});
-  const auto friction_of = [&](Vec force, Vec motion)
-  {
-    std::vector<double> friction = all_entries(product(linearised.contact.friction, force));
-    const std::vector<double> moved = relative(interface, motion);
-    for (std::size_t i = 0; i < interface.gap.size(); ++i)
-      for (std::size_t k = 0; k < static_cast<std::size_t>(interface.directions); ++k)
-        if (const double c = slip_compliance_of(interface, i); c > 0)
-          TangentView<double>(friction, interface.directions).of(i)[k] =
-              -PairView(moved, interface.directions).tangential(i)[k] / c;
-    return friction;
-  };
-  const std::vector<double> re = friction_of(real, mode.real), im = friction_of(imaginary, mode.imaginary);
+  if (!equilibrium.history || !linearised.contact.friction.get()) return pairs;
+  const std::vector<Complex> friction =
+      reactions_of(sliding, linearised, ReactionRows::tangential, mode.lambda, mode.real, mode.imaginary);
   for (std::size_t i = 0; i < interface.gap.size(); ++i)
   {
     if (!is_undriven(interface, i) || equilibrium.history->statuses[i] != ContactStatus::stick) continue;
@@ -244,9 +230,8 @@ std::vector<StuckPair> stuck_pairs(const SlidingEquilibrium& sliding, const Line
     pair.mu = friction_coefficient(interface.friction.of(i), 0).value;
     pair.reaction0 = PairView(equilibrium.reactions, interface.directions).vector(i);
     pair.reaction[0] = mode.reactions[i];
-    for (std::size_t k = 0; k < static_cast<std::size_t>(interface.directions); ++k)
-      pair.reaction[k + 1] = {TangentView(re, interface.directions).of(i)[k],
-                              TangentView(im, interface.directions).of(i)[k]};
+    const auto directions = static_cast<std::size_t>(interface.directions);
+    std::copy_n(friction.begin() + to_int(i * directions), directions, pair.reaction.begin() + 1);
   }
   return pairs;
 }

@@ -69,17 +69,6 @@ Owned<Mat> contact_stiffness(const Interface& interface, const std::vector<char>
 /// A + B of any symmetry.
 Owned<Mat> sum_of(Mat A, Mat B);
 
-/// Normal reactions lambda_n per pair that a motion phi e^{s t} takes are (s^2 M + s C + K) phi, from the pivots' rows
-/// of (s^2 M + s C + K) phi = R' lambda_n; 0 on open pairs. Every choice of rows agrees if s and phi are an eigenpair.
-struct ReactionOperator
-{
-  Owned<Mat> M, C, K; // pairs x dofs
-};
-
-/// lambda_n per pair [N per m of the motion], whole on every rank. `real`, `imaginary`: of phi. Collective.
-std::vector<std::complex<double>> normal_reactions(const ReactionOperator& reaction, std::complex<double> s, Vec real,
-                                                   Vec imaginary);
-
 /// C with G, and with C_f where the interface has it on. Collective.
 Owned<Mat> sliding_damping(const SlidingEquilibrium& sliding);
 
@@ -87,22 +76,31 @@ Owned<Mat> sliding_damping(const SlidingEquilibrium& sliding);
 struct LinearisedSliding
 {
   ClosedContact contact;
-  Owned<Mat> C; // sliding_damping
-  Owned<Mat> K; // with H and with pairs that have a compliance; null: the structure's
-  ReactionOperator reaction;
+  Owned<Mat> C;        // sliding_damping
+  Owned<Mat> K;        // with H and with pairs that have a compliance; null: the structure's
   Owned<Mat> M_z, K_z; // Z'M Z, Z'K Z, symmetric: the frictionless bilateral problem
 };
 
 /// Linearises about the equilibrium. Collective. Error: as of eliminate_closed_pairs.
 LinearisedSliding linearise(const SlidingEquilibrium& sliding);
 
+/// The reactions that are asked for: of normal rows, or of tangential ones, by pairs and directions.
+enum class ReactionRows
+{
+  normal,
+  tangential, // where there are undriven pairs
+};
+
+/// Reactions [N per m of the motion] that a motion phi e^{s t} takes, whole on every rank: lambda of (s^2 M + s C + K)
+/// phi = R' lambda by the pivots' rows, -B phi/c of rows with a compliance c; 0 on open pairs. Every choice of rows
+/// agrees if s and phi are an eigenpair. `real`, `imaginary`: of phi. Collective.
+std::vector<std::complex<double>> reactions_of(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
+                                               ReactionRows rows, std::complex<double> s, Vec real, Vec imaginary);
+
 // Pairs with a compliance in the linearised sliding problem (src/README.md, section 3.13).
 
 /// S of the closed pairs with a compliance c, on the rows of B: contact_stiffness is B'S B. It has 1/c and, from normal
 /// to tangential rows, mu e/c; of elastic slip 1/c_t in tangential rows. Null without such pairs. Collective.
 Owned<Mat> stiffness_of_pairs(const Interface& interface, const std::vector<char>& closed, PairForces part);
-
-/// Rows -B_n/c of the closed pairs with a compliance, which give their reactions; null without such pairs.
-Owned<Mat> compliant_reactions(const Interface& interface, const std::vector<char>& closed);
 
 } // namespace squeal

@@ -79,8 +79,8 @@ void mark_symmetric(Mat A);
 
 using SparseRow = std::map<PetscInt, double>; // coefficient of each free degree of freedom
 
-/// Adds direction . u(node) to a row.
-void add_displacement(const DofMap& dofs, int node, const Vec3& direction, SparseRow& row);
+/// direction . (sum of weight u(node)), less what cancels up to rounding.
+SparseRow displacement_row(const DofMap& dofs, std::span<const PairNode> nodes, const Vec3& direction);
 
 /// Returns the AIJ matrix with this rank's rows. Collective.
 Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_columns, MPI_Comm comm);
