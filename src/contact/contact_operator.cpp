@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <Eigen/Core>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -184,8 +185,8 @@ void ContactOperator::hold_whole() const
 
 void ContactOperator::add_product(std::size_t pair, const PairVector& change, std::span<double> w) const
 {
-  const PairMatrixView W(entries(), pairs(), directions_);
-  add_whole_rows(W.row(pair, 0).data(), size(), W.rows_per_pair(), change, w.data());
+  const PairRows<std::size_t> rows(directions_);
+  add_whole_rows(&entries()[rows.normal(pair) * size()], size(), rows.per_pair(), change, w.data());
 }
 
 void ContactOperator::add_product(std::size_t pair, const PairVector& change, std::span<float> w) const
@@ -222,11 +223,11 @@ double ContactOperator::largest_eigenvalue(std::span<const double> roots, int it
 
 ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions)
 {
-  const PairMatrixView view(W, static_cast<std::size_t>(pairs), directions);
-  const std::size_t n = view.size();
+  const PairRows<std::size_t> rows(directions);
+  const std::size_t n = rows.rows_of(static_cast<std::size_t>(pairs));
   if (W.size() != n * n)
-    throw Error("contact: " + std::to_string(pairs) + " pairs of " + std::to_string(view.rows_per_pair()) +
-                " rows need " + std::to_string(n * n) + " entries of W, not " + std::to_string(W.size()));
+    throw Error(format("contact: %d pairs of %zu rows need %zu entries of W, not %zu", pairs, rows.per_pair(), n * n,
+                       W.size()));
   return {std::move(W), pairs, directions, PETSC_COMM_SELF};
 }
 
@@ -356,17 +357,13 @@ Factor factor_held(Mat A, const Interface& interface, const DofNames& names, con
 namespace
 {
 
-double product(const std::vector<double>& a, const std::vector<double>& b)
-{
-  return std::inner_product(a.begin(), a.end(), b.begin(), 0.);
-}
-
 /// B x, without the rows that are not taken.
-std::vector<double> rows_taken(const Interface& interface, const std::vector<char>& taken, Vec x)
+Eigen::VectorXd rows_taken(const Interface& interface, const std::vector<char>& taken, Vec x)
 {
-  std::vector<double> rows = relative(interface, x);
-  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] *= taken[i];
-  return rows;
+  const std::vector<double> rows = relative(interface, x);
+  const auto size = static_cast<Eigen::Index>(rows.size());
+  return Eigen::VectorXd::Map(rows.data(), size)
+      .cwiseProduct(Eigen::VectorX<char>::Map(taken.data(), size).cast<double>());
 }
 
 } // namespace
@@ -376,25 +373,23 @@ std::vector<double> forces_on_rows(const Interface& interface, const std::vector
   constexpr double rounding = 1e-14;
   constexpr int most_passes = 200;
   const Owned<Vec> work = zeros_like(x);
-  std::vector<double> residual = rows_taken(interface, taken, x), z(residual.size(), 0.), along = residual;
-  double square = product(residual, residual);
+  Eigen::VectorXd residual = rows_taken(interface, taken, x), z = Eigen::VectorXd::Zero(residual.size()),
+                  along = residual;
+  double square = residual.squaredNorm();
   const double enough = rounding * rounding * square;
   for (int pass = 0; square > enough && pass < most_passes; ++pass)
   {
     check(VecSet(work, 0));
-    add_reactions(interface, along, work);
-    const std::vector<double> image = rows_taken(interface, taken, work);
-    const double part = square / product(along, image);
-    for (std::size_t i = 0; i < z.size(); ++i)
-    {
-      z[i] += part * along[i];
-      residual[i] -= part * image[i];
-    }
-    const double next = product(residual, residual);
-    for (std::size_t i = 0; i < z.size(); ++i) along[i] = residual[i] + next / square * along[i];
+    add_reactions(interface, {along.begin(), along.end()}, work);
+    const Eigen::VectorXd image = rows_taken(interface, taken, work);
+    const double part = square / along.dot(image);
+    z += part * along;
+    residual -= part * image;
+    const double next = residual.squaredNorm();
+    along = residual + next / square * along;
     square = next;
   }
-  return z;
+  return {z.begin(), z.end()};
 }
 
 } // namespace squeal

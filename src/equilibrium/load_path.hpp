@@ -64,8 +64,11 @@ bool balances(const Structure& structure, const Interface& interface, Equilibriu
 
 constexpr Eigen::Index few_pairs = 12; // whose 4096 sets take less than the path of a thousand pairs
 
-/// A solution by Lemke's path, or of few pairs by trying every set of closed ones. Of few pairs none means that there
-/// is none; of more that none was found.
-std::optional<StickSlipState> rest_by_pivoting(const StickSlipOperator& of, const Eigen::VectorXd& q);
+/// The end of Lemke's path, on which z falls and one pair at a time is neither open nor closed (Cottle, Pang and Stone
+/// 1992, section 4.4). Nothing where it leads away.
+std::optional<StickSlipState> rest_by_path(const StickSlipOperator& of, const Eigen::VectorXd& q);
+
+/// A solution by trying every set of closed pairs, of few pairs alone: none means that there is none.
+std::optional<StickSlipState> rest_of_few(const StickSlipOperator& of, const Eigen::VectorXd& q);
 
 } // namespace squeal

@@ -221,15 +221,16 @@ PathWalk rest_of(const PathProblem& problem, const std::vector<char>& expected)
   const auto rests = [&] {
     return advance_to(problem, {0, 1}, 1, std::numeric_limits<double>::infinity(), walk) == Advance::done;
   };
-  walk.completed = rests();
-  if (walk.completed) return walk;
-  if (auto pivoted = rest_by_pivoting(problem.of, walk.q))
+  const auto rests_from = [&](const std::optional<StickSlipState>& start)
   {
-    walk.state = *std::move(pivoted);
-    walk.completed = rests();
-  }
-  else
-    walk.impossible = walk.q.size() <= few_pairs || has_no_solution(problem.of, walk.q);
+    if (start) walk.state = *start;
+    return start && rests();
+  };
+  walk.completed = rests() || rests_from(rest_by_path(problem.of, walk.q));
+  if (walk.completed) return walk;
+  const auto found = rest_of_few(problem.of, walk.q);
+  walk.completed = rests_from(found);
+  walk.impossible = !found && (walk.q.size() <= few_pairs || has_no_solution(problem.of, walk.q));
   return walk;
 }
 

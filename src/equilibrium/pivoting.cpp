@@ -20,8 +20,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The solution of a set of closed pairs; nothing where a sign is wrong or the pairs do not balance. Where they share a
-/// rigid face it is the shortest one.
+/// The solution of a set of closed pairs, the shortest one where they share a rigid face; nothing where a sign is wrong
+/// or the pairs do not balance.
 std::optional<StickSlipState> solution_of(const StickSlipOperator& of, const VectorXd& q,
                                           const std::vector<char>& closed)
 {
@@ -29,17 +29,9 @@ std::optional<StickSlipState> solution_of(const StickSlipOperator& of, const Vec
   MatrixXd system = of.N;
   for (Index i = 0; i < q.size(); ++i)
     if (closed[static_cast<std::size_t>(i)]) system.col(i) = -of.M.col(i) / of.compliance;
-  const Eigen::PartialPivLU<MatrixXd> factors(system);
-  const VectorXd pivots = factors.matrixLU().diagonal().cwiseAbs();
-  VectorXd x;
-  if (pivots.minCoeff() > 1e-11 * pivots.maxCoeff())
-    x = factors.solve(q);
-  else
-  {
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal;
-    orthogonal.setThreshold(1e-11);
-    x = orthogonal.compute(system).solve(q);
-  }
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> orthogonal;
+  orthogonal.setThreshold(1e-11);
+  const VectorXd x = orthogonal.compute(system).solve(q);
   if (!(x.minCoeff() >= -rounding * x.lpNorm<Eigen::Infinity>()) || !((system * x - q).norm() <= 1e-9 * q.norm()))
     return std::nullopt;
   StickSlipState state{VectorXd::Zero(q.size()), VectorXd::Zero(q.size())};
@@ -91,9 +83,9 @@ Index exchange(Dictionary& of, Index row, Index column)
   return of.right[static_cast<std::size_t>(column)];
 }
 
-/// The closed pairs at the end of Lemke's path, on which z falls and one pair at a time is neither open nor closed
-/// (Cottle, Pang and Stone 1992, section 4.4).
-std::optional<std::vector<char>> closed_by_path(const StickSlipOperator& of, const VectorXd& q)
+} // namespace
+
+std::optional<StickSlipState> rest_by_path(const StickSlipOperator& of, const VectorXd& q)
 {
   constexpr double softness = 1e-10; // of the compliance: pairs may share a rigid face
   const Index pairs = q.size(), z = 2 * pairs;
@@ -120,19 +112,19 @@ std::optional<std::vector<char>> closed_by_path(const StickSlipOperator& of, con
       out = exchange(dictionary, row, column);
     }
   }
-  std::vector<char> closed(static_cast<std::size_t>(pairs), false);
-  for (const Index variable : dictionary.right)
-    if (variable < pairs) closed[static_cast<std::size_t>(variable)] = true;
-  return closed;
+  StickSlipState state{VectorXd::Zero(pairs), VectorXd::Zero(pairs)};
+  for (Index i = 0; i < pairs; ++i)
+  {
+    const Index variable = dictionary.left[static_cast<std::size_t>(i)];
+    const double value = dictionary.table(i, pairs + 1);
+    variable < pairs ? state.w[variable] = value : state.r[variable - pairs] = value / of.compliance;
+  }
+  return state;
 }
 
-} // namespace
-
-std::optional<StickSlipState> rest_by_pivoting(const StickSlipOperator& of, const VectorXd& q)
+std::optional<StickSlipState> rest_of_few(const StickSlipOperator& of, const VectorXd& q)
 {
   const auto pairs = static_cast<std::size_t>(q.size());
-  if (const auto closed = closed_by_path(of, q))
-    if (auto found = solution_of(of, q, *closed)) return found;
   for (std::size_t set = 0; q.size() <= few_pairs && set < (std::size_t{1} << pairs); ++set)
   {
     std::vector<char> closed(pairs);
@@ -144,10 +136,6 @@ std::optional<StickSlipState> rest_by_pivoting(const StickSlipOperator& of, cons
 
 namespace
 {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 /// Forces that span each pair's cone, columns over its rows. A disc becomes the polygon drawn round it, so that what no
 /// sum of them balances, no friction does.

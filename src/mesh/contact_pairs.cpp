@@ -96,6 +96,16 @@ void turn_shells(SurfaceContact& c)
               ": correct the mesh, or the normal, which points out of the rotor");
 }
 
+/// Says why no face of the surfaces of a contact or tie (`user`) is covered.
+[[noreturn]] void fail_apart(const std::string& surfaces, const std::string& user, const OverlapFindings& findings)
+{
+  if (findings.nearest != 0)
+    throw Error(surfaces +
+                format("the surfaces are at least %.4g m apart along the normal, at ", std::abs(findings.nearest)) +
+                text_of(findings.nearest_at) + ": give the " + user + " a reach above that, or correct the mesh");
+  throw Error(surfaces + "no face of one is opposite a face of the other: correct the names or the mesh");
+}
+
 /// Throws Error for surfaces that do not meet or that penetrate each other.
 void check_meeting(const SurfaceContact& c, const SlaveRows& rows)
 {
@@ -104,16 +114,14 @@ void check_meeting(const SurfaceContact& c, const SlaveRows& rows)
   if (rows.meet()) return;
   const std::string surfaces = name_of(c.contact);
   if (findings.nearest < 0) fail_inside(c, -findings.nearest, findings.nearest_at);
-  if (findings.nearest > 0)
-    throw Error(surfaces + format("the surfaces are at least %.4g m apart along the normal, at ", findings.nearest) +
-                text_of(findings.nearest_at) + ": give the contact a reach above that, or correct the mesh");
-  if (findings.same_way && c.contact.normal)
+  const bool same_way = findings.nearest == 0 && findings.same_way;
+  if (same_way && c.contact.normal)
     throw Error(surfaces + "'" + c.slave.name + "' looks away from '" + c.master.name + "' along the given normal at " +
                 text_of(findings.same_way_at) + ": the normal points out of the rotor into the stator, turn it");
-  if (findings.same_way)
+  if (same_way)
     throw Error(surfaces + "both surfaces look the same way at " + text_of(findings.same_way_at) +
                 ": name the faces that look at each other");
-  throw Error(surfaces + "no face of one is opposite a face of the other: correct the names or the mesh");
+  fail_apart(surfaces, "contact", findings);
 }
 
 /// Whether supports and rigid bodies hold a node along its normal.
@@ -300,18 +308,6 @@ std::string name_of(const Scene& scene, int tie)
   return tie < 0 ? "edge of a shell: " : name_of(scene.ties[static_cast<std::size_t>(tie)]);
 }
 
-void check_meeting(const Tie& tie, const SlaveRows& rows)
-{
-  if (rows.meet()) return;
-  const OverlapFindings& found = rows.findings;
-  const Vec3& at = found.nearest_at;
-  if (found.nearest != 0)
-    throw Error(name_of(tie) + format("the surfaces are at least %.4g m apart along the normal, at (%g, %g, %g): give "
-                                      "the tie a reach above that, or correct the mesh",
-                                      std::abs(found.nearest), at[0], at[1], at[2]));
-  throw Error(name_of(tie) + "no face of one is opposite a face of the other: correct the names or the mesh");
-}
-
 /// The row of a slave node solved for its own motion. The weights of the others add up to 1, so that a translation is
 /// kept to rounding.
 TiedNode solved(const Mesh& mesh, const SlaveRow& row, int node, int tie)
@@ -347,7 +343,7 @@ void add_tie(const Mesh& mesh, const Tie& tie, int index, TiedNodes& result)
   const OverlapLimits limits{tie.reach, tie.reach == 0 ? rounding : std::max(rounding, tie.reach), tie.reach == 0,
                              Eigen::Vector3d::Zero()};
   const SlaveRows rows = dual_rows(slave, master, limits);
-  check_meeting(tie, rows);
+  if (!rows.meet()) fail_apart(name_of(tie), "tie", rows.findings);
   for (std::size_t i = 0; i < rows.rows.size(); ++i)
     if (const SlaveRow& row = rows.rows[i]; row.is_covered() && row.area >= light * row.whole)
       result.nodes.push_back(solved(mesh, row, slave.nodes[i], index));

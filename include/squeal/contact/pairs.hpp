@@ -111,40 +111,6 @@ private:
 template <class Container> TangentView(Container&, int)
     -> TangentView<std::remove_pointer_t<decltype(std::declval<Container&>().data())>>;
 
-/// A dense matrix over the rows of all pairs, stored by rows.
-class PairMatrixView
-{
-public:
-  PairMatrixView(std::span<const double> values, std::size_t pairs, int directions)
-      : values_(values), rows_(directions), size_(rows_.rows_of(pairs))
-  {
-  }
-
-  std::size_t size() const { return size_; } // rows
-  std::size_t rows_per_pair() const { return rows_.per_pair(); }
-
-  /// The entries that couple the rows of pair i with those of pair j.
-  PairBlock block(std::size_t i, std::size_t j) const
-  {
-    PairBlock result{};
-    for (std::size_t k = 0; k < rows_.per_pair(); ++k)
-      for (std::size_t l = 0; l < rows_.per_pair(); ++l)
-        result[k][l] = values_[(rows_.normal(i) + k) * size_ + rows_.normal(j) + l];
-    return result;
-  }
-
-  /// Row k of a pair, 0 the normal one. The rows of a pair follow each other.
-  std::span<const double> row(std::size_t pair, std::size_t k) const
-  {
-    return values_.subspan((rows_.normal(pair) + k) * size_, size_);
-  }
-
-private:
-  std::span<const double> values_;
-  PairRows<std::size_t> rows_;
-  std::size_t size_;
-};
-
 /// a . b over the entries of a.
 inline double dot(std::span<const double> a, std::span<const double> b)
 {
