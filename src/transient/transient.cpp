@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <Eigen/Core>
 #include <limits>
 
 namespace squeal
@@ -23,7 +24,6 @@ ModeAmplitude follow(const Structure& structure, const Equilibrium& equilibrium,
   check(VecAXPBYPCZ(amplitude.v_real, sigma, -omega, 0, mode.real, mode.imaginary));
   check(VecAXPBYPCZ(amplitude.v_imaginary, omega, sigma, 0, mode.real, mode.imaginary));
 
-  const auto product = [](Vec left, Mat matrix, Vec right) { return dot(left, squeal::product(matrix, right)); };
   amplitude.K_real = product(mode.real, structure.K, equilibrium.u);
   amplitude.K_imaginary = product(mode.imaginary, structure.K, equilibrium.u);
   amplitude.rr = product(mode.real, structure.K, mode.real) + product(amplitude.v_real, structure.M, amplitude.v_real);
@@ -57,18 +57,9 @@ double growth_rate(const ModeAmplitude& amplitude, double period)
   const double length = t.empty() ? 0 : period * std::floor((t.back() - t.front()) / period * slack);
   if (!(length > 0)) return std::numeric_limits<double>::quiet_NaN();
   const auto count = std::upper_bound(t.begin(), t.end(), t.front() + length * slack) - t.begin();
-  double mean_t = 0, mean_y = 0, ty = 0, tt = 0;
-  for (auto i = 0u; i < count; ++i)
-  {
-    mean_t += t[i] / static_cast<double>(count);
-    mean_y += y[i] / static_cast<double>(count);
-  }
-  for (auto i = 0u; i < count; ++i)
-  {
-    ty += (t[i] - mean_t) * (y[i] - mean_y);
-    tt += (t[i] - mean_t) * (t[i] - mean_t);
-  }
-  return ty / tt;
+  const Eigen::Map<const Eigen::ArrayXd> at(t.data(), count), log(y.data(), count);
+  const Eigen::ArrayXd away = at - at.mean();
+  return (away * (log - log.mean())).sum() / away.square().sum();
 }
 
 // The time loop: marching with a history, and the run that follows one mode (headers: the equations).
@@ -187,8 +178,9 @@ long plan(Trajectory& trajectory, const ComplexMode* mode, TransientSettings set
   return settings.steps;
 }
 
-void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
+void conclude(Trajectory& trajectory, long asked)
 {
+  const MarchSummary& summary = trajectory;
   Outcome& outcome = trajectory.outcome;
   outcome.kind = OutcomeKind::completed;
   if (trajectory.theta < 0.5) outcome.reason = "theta below 1/2 adds (1/2 - theta) h omega^2 to every growth rate";
@@ -221,26 +213,14 @@ void conclude(Trajectory& trajectory, const MarchSummary& summary, long asked)
   outcome.iterations = static_cast<int>(summary.contact_iterations_mean * static_cast<double>(summary.steps) + 0.5);
 }
 
-/// How far a march has come.
-struct MarchProgress
+/// How far a march has come. `iterations`: of contact in all.
+void describe_march(Checkpoint& checkpoint, const FileOrder& order, MarchSummary& summary, double& iterations,
+                    State& state, History& history)
 {
-  const Structure& structure;
-  MarchSummary& summary;
-  double& iterations; // of contact in all
-  State& state;
-  History& history;
-};
-
-void describe(Checkpoint& checkpoint, const MarchProgress& progress)
-{
-  MarchSummary& summary = progress.summary;
-  State& state = progress.state;
-  describe_all(checkpoint, summary.steps, summary.unconverged, summary.as_one, summary.first_unconverged,
-               summary.contact_residual_max, summary.fall_of_friction_max, summary.energy_defect_max,
-               progress.iterations, state.time, state.reactions, state.slip, progress.history.probes,
-               progress.history.joint_work);
-  for_each_series([&](auto, auto, auto& series) { describe(checkpoint, series); }, progress.history);
-  const FileOrder order(progress.structure);
+  describe_all(checkpoint, summary.steps, summary.unconverged, summary.contact_steps_as_one, summary.first_unconverged,
+               summary.contact_residual_max, summary.fall_of_friction_max, summary.energy_defect_max, iterations,
+               state.time, state.reactions, state.slip, history.probes, history.joint_work);
+  for_each_series([&](auto, auto, auto& series) { describe(checkpoint, series); }, history);
   order.describe(checkpoint, state.u);
   order.describe(checkpoint, state.v);
 }
@@ -264,7 +244,7 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
   const MPI_Comm comm = comm_of(structure.load);
   const Description described = [&](Checkpoint& kept)
   {
-    describe(kept, MarchProgress{structure, summary, iterations, state, history});
+    describe_march(kept, FileOrder(structure), summary, iterations, state, history);
     checkpoint(kept);
   };
   if (checkpoint && restore(name_of_checkpoint, comm, described) && rank_of(comm) == 0)
@@ -281,7 +261,7 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     summary.contact_residual_max = std::max(summary.contact_residual_max, report.contact_residual);
     summary.fall_of_friction_max = std::max(summary.fall_of_friction_max, report.fall_of_friction);
     iterations += report.contact_iterations;
-    summary.as_one += report.contact_as_one;
+    summary.contact_steps_as_one += report.contact_as_one;
     const double defect = std::abs(report.energy_defect);
     const double scale = std::max({report.energy, std::abs(report.contact_work), std::abs(report.load_work)});
     if (defect > 0) summary.energy_defect_max = std::max(summary.energy_defect_max, defect / scale);
@@ -375,21 +355,17 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
   const Description followed = [&](Checkpoint& checkpoint)
   { describe_all(checkpoint, slides, amplitude.time, amplitude.log_modulus); };
   const double wall = MPI_Wtime();
-  const MarchSummary summary =
+  static_cast<MarchSummary&>(trajectory) =
       march(step, sliding, steps, trajectory.end, {probes, trajectory.history, watch, {}, followed, &settings.ramps});
-  trajectory.seconds_per_step = (MPI_Wtime() - wall) / static_cast<double>(std::max(summary.steps, 1L));
+  trajectory.seconds_per_step = (MPI_Wtime() - wall) / static_cast<double>(std::max(trajectory.steps, 1L));
   trajectory.factor_seconds = step.factor_seconds;
   trajectory.condensed_seconds = step.condensed_seconds;
-  trajectory.steps = summary.steps;
-  trajectory.energy_defect_max = summary.energy_defect_max;
-  trajectory.contact_iterations_mean = summary.contact_iterations_mean;
-  trajectory.contact_steps_as_one = summary.as_one;
   if (mode)
   {
-    trajectory.periods = static_cast<double>(summary.steps) * step.h * std::abs(mode->lambda.imag()) / two_pi;
+    trajectory.periods = static_cast<double>(trajectory.steps) * step.h * std::abs(mode->lambda.imag()) / two_pi;
     if (follows) trajectory.growth_rate_fit = growth_rate(amplitude, two_pi / std::abs(trajectory.predicted.imag()));
   }
-  conclude(trajectory, summary, steps);
+  conclude(trajectory, steps);
   if (!settings.save_state.empty()) write_state(trajectory.end, structure, settings.save_state);
   return trajectory;
 }

@@ -48,8 +48,8 @@ struct MarchSummary
   long steps = 0; // fewer than asked when the energy stopped being finite, or the run is asked to end
   bool interrupted = false;
   long unconverged = 0;
-  long as_one = 0;              // steps in which ranks had to sweep one after the other
-  double first_unconverged = 0; // [s]
+  long contact_steps_as_one = 0; // in which ranks had to sweep one after the other
+  double first_unconverged = 0;  // [s]
   double contact_residual_max = 0;
   double fall_of_friction_max = 0; // as of StepReport
   double energy_defect_max = 0;    // over the energy of its step, or its works where they are larger
@@ -75,18 +75,15 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
 /// outcome: "completed", "interrupted", "refused" (step_guards.hpp: theta and h would show a wrong growth), "not
 /// converged" (contact, or an energy that is no longer finite). residual: the largest contact residual; iterations:
 /// contact iterations in all.
-struct Trajectory
+struct Trajectory : MarchSummary
 {
   Outcome outcome;
-  double theta = 0;     // [-]
-  double step_size = 0; // [s]
-  double periods = 0;   // [-] of the followed mode
-  long steps = 0;
+  double theta = 0;               // [-]
+  double step_size = 0;           // [s]
+  double periods = 0;             // [-] of the followed mode
   double growth_rate_fit = 0;     // [1/s] of the followed mode's amplitude before the first event; NaN: too short
   std::complex<double> predicted; // [1/s] discrete eigenvalue of the followed mode; NaN: none is followed
-  double energy_defect_max = 0;   // of the energy, largest over the steps
-  double seconds_per_step = 0, contact_iterations_mean = 0;
-  long contact_steps_as_one = 0;                    // in which ranks had to sweep one after the other
+  double seconds_per_step = 0;
   double factor_seconds = 0, condensed_seconds = 0; // of its ThetaStep
   State end;
   History history;
