@@ -15,11 +15,6 @@ namespace squeal
 namespace
 {
 
-double half_quadratic_form(Mat A, Vec x)
-{
-  return dot(x, product(A, x)) / 2;
-}
-
 /// The displacement, velocity and slip positions of a state file, empty ones where it has none. Throws Error.
 std::vector<std::vector<double>> parts_of_state(const std::filesystem::path& file, PetscInt size)
 {
@@ -52,11 +47,7 @@ State copy_of(const State& state)
 
 double product(Vec x, Mat A, Vec y)
 {
-  const Owned<Vec> Ay = zeros_like(y);
-  double result = 0;
-  check(MatMult(A, y, Ay));
-  check(VecDot(x, Ay, &result));
-  return result;
+  return dot(x, product(A, y));
 }
 
 double kinetic_energy(const Structure& structure, Vec v)
