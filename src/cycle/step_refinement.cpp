@@ -30,7 +30,7 @@ double largest(const RelativeChange& errors)
 
 /// The relative error of the last cycle's quantity, from its change since each of the others. Errors of order 2 fall
 /// alike, or depend on where in their steps pairs stick and open, so that the largest counts. Impacts have errors of
-/// order 1, which all changes show.
+/// order 1, which the last two changes show.
 double step_error(const std::vector<CycleAtSteps>& cycles, double CycleAtSteps::*quantity)
 {
   constexpr double alike = 1.5;
@@ -41,11 +41,11 @@ double step_error(const std::vector<CycleAtSteps>& cycles, double CycleAtSteps::
     const double change = std::abs(other.*quantity / (last.*quantity) - 1),
                  ratio = static_cast<double>(other.steps) / last.steps,
                  second = change * ratio * ratio / std::abs(1 - ratio * ratio);
-    first = std::min(first, change * ratio / std::abs(1 - ratio));
+    if (&cycles.back() - &other <= 2) first = std::min(first, change * ratio / std::abs(1 - ratio));
     least = std::min(least, second);
     most = std::max(most, second);
   }
-  return cycles.size() > 2 && most <= alike * least ? alike * most : std::max(first, most);
+  return cycles.size() > 3 && most <= alike * least ? alike * most : std::max(first, most);
 }
 
 CycleAtSteps at_steps(const LimitCycle& cycle)

@@ -49,16 +49,18 @@ MotionVerdict judge_irregular(std::span<const double> energies)
                  needed)};
 }
 
-/// Whether the periods' energies are one value within what is asked of a cycle's energy by default (accuracy), and do
-/// not part from it.
-bool steady(std::span<const double> energies)
+/// Whether the energies of periods of so many rounds are one value within what is asked of a cycle's energy by default
+/// (accuracy), and do not part from it. Two frequencies of a torus are near one of the fractions up to q by chance,
+/// which are as many as q^2.
+bool steady(std::span<const double> energies, int rounds)
 {
   double sum = 0, squares = 0;
   for (const double energy : energies) sum += energy;
   const double middle = sum / static_cast<double>(energies.size());
   for (const double energy : energies) squares += (energy - middle) * (energy - middle);
   const MeanValue decay = decay_of_spread(energies);
-  return std::sqrt(squares / static_cast<double>(energies.size())) < 1e-3 * middle && decay.value + decay.error >= 0;
+  const double within = 1e-3 / std::pow(std::max(rounds, 1), 2);
+  return std::sqrt(squares / static_cast<double>(energies.size())) < within * middle && decay.value + decay.error >= 0;
 }
 
 /// Whether the two largest exponents are apart by their bars: a wide bar holds zero and much else.
@@ -159,7 +161,7 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
   // slow motions that die out have exponents within their bars of zero, too; of a torus whose parts hardly know of each
   // other the energies are as steady, and the second frequency tells
   if ((zero == 1 && (base.second == 0 || parted(exponents, together))) ||
-      (zero > 0 && steady(energies) && one_frequency))
+      (zero > 0 && steady(energies, base.closes_after) && one_frequency))
     return {MotionKind::periodic, "", ""};
   if (zero == 1) return {MotionKind::undecided, "a cycle and an irregular motion: the exponents' bars overlap", more};
   if (zero == 2) return judge_torus(energies, base);

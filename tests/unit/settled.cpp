@@ -199,6 +199,7 @@ TEST_CASE("steady energies are a cycle's, unless the spectrum has a second frequ
   CHECK(judge_motion(two_zeros, energies, {1, 0, 0, 1}).kind == MotionKind::periodic);
   CHECK(judge_motion(two_zeros, energies, {1, 0.5, 2, 1}).kind == MotionKind::periodic);
   CHECK(judge_motion(two_zeros, energies, {1, 0.97, 0, 1}).kind != MotionKind::periodic);
+  CHECK(judge_motion(two_zeros, energies, {1, 4. / 19, 19, 1}).kind != MotionKind::periodic); // a torus comes as near
 }
 
 TEST_CASE("an exponent that is zero within a wide bar makes no cycle of a motion of two frequencies")
