@@ -1,6 +1,7 @@
 #include "../support/contact_problem.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <doctest/doctest.h>
 #include <random>
@@ -262,4 +263,31 @@ TEST_CASE("a contact that carries little is judged by what it carries, beside on
   const Vector status_of = {2e4, 0, 1e-5, 0};
   CHECK(contact_status(PairView<const double>(status_of, 1), PairView<const double>(status_of, 1), friction)[1] ==
         ContactStatus::stick);
+}
+
+TEST_CASE("light plates between two bodies take few sweeps")
+{
+  // five bodies on each other: W is the difference of their velocities by unit forces, along the normal and the tangent
+  constexpr std::size_t contacts = 4, rows = 2 * contacts;
+  const std::array<double, contacts + 1> inverse_mass = {1, 1e3, 1e3, 1e3, 1};
+  Vector W(rows * rows, 0.), b;
+  for (std::size_t i = 0; i < contacts; ++i)
+  {
+    for (const std::size_t row : {2 * i, 2 * i + 1})
+    {
+      W[row * rows + row] = inverse_mass[i] + inverse_mass[i + 1];
+      if (i > 0) W[row * rows + row - 2] = W[(row - 2) * rows + row] = -inverse_mass[i];
+    }
+    b.insert(b.end(), {-0.25, 0.05});
+  }
+  Vector r;
+  const ContactResult result = solve_contact(make_contact_operator(W, contacts, 1), b, {0.3}, {}, r);
+  CHECK(result.converged);
+  CHECK(result.iterations < 40); // sweeps alone leave some 0.999 of the error each
+  // stuck together they carry their common motion: the outer ones have forces of half their relative motion, nearly
+  for (std::size_t i = 0; i < contacts; ++i)
+  {
+    CHECK(r[2 * i] == doctest::Approx(0.5).epsilon(2e-3));
+    CHECK(r[2 * i + 1] == doctest::Approx(-0.1).epsilon(2e-3));
+  }
 }
