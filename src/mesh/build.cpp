@@ -58,7 +58,7 @@ int part_of(const ElementBlock& block, const Scene& scene)
 void add_elements(const ElementBlock& block, int part, const Scene& scene, Mesh& mesh)
 {
   const std::optional<Shape> shape = shape_of(block.type);
-  if (!shape || dimension_of(*shape) == 1 || (is_shell(*shape) && !mid_sides(*shape).empty()))
+  if (!shape || dimension_of(*shape) == 1 || (is_shell(*shape) && !middles_of(*shape).empty()))
     throw Error("part '" + scene.parts[part].name + "' has elements '" + block.type_name +
                 "', for which there is no kernel: " + known_elements);
   const int n = block.nodes_per_element;
@@ -259,11 +259,12 @@ std::vector<MiddleOfSide> sides_of(const Element& element)
     if (corners.size() <= 4) add(corners, element.nodes[next++]);
   }
   const std::size_t middles = sides.size();
+  const bool is_full = std::ranges::any_of(middles_of(element.shape), [](const auto& of) { return of.size() == 4; });
   for (const std::vector<int>& face : faces_of(element))
   {
     for (std::size_t i = 0; middles == 0 && i < face.size(); ++i)
       add(std::array{face[i], face[(i + 1) % face.size()]}, -1);
-    if (face.size() == 4 && middles == mid_sides(element.shape).size()) add(face, -1);
+    if (face.size() == 4 && !is_full) add(face, -1);
   }
   return sides;
 }

@@ -361,11 +361,11 @@ void add_mid_sides(const Mesh& mesh, TiedNodes& result)
   if (edges.empty()) return;
   std::set<int> found;
   for (const Element& element : mesh.elements)
-    for (std::size_t k = 0; const auto& [first, second] : mid_sides(element.shape))
+    for (std::size_t k = 0; const std::vector<int>& ends : middles_of(element.shape))
     {
-      const int a = element.nodes[first], b = element.nodes[second];
+      const int a = element.nodes[ends[0]], b = element.nodes[ends[1]];
       const int middle = element.nodes[corner_count(element.shape) + k++];
-      if (edges.contains(ends_of(a, b)) && found.insert(middle).second)
+      if (ends.size() == 2 && edges.contains(ends_of(a, b)) && found.insert(middle).second)
         result.nodes.push_back({middle, -1, {{a, 0.5}, {b, 0.5}}});
     }
 }

@@ -144,12 +144,11 @@ Overlap integrate(const SlaveInPlane& slave, const PlacedFace& master, const Nod
 {
   const auto ns = slave.x.cols(), nm = x.cols();
   Overlap overlap{FaceValues::Zero(ns), FaceMatrix::Zero(ns, ns), FaceMatrix::Zero(ns, nm), 1e300, 1e300, {}};
-  const bool triangles = corner_count(slave.face.shape) == 3 && corner_count(master.shape) == 3;
   for (std::size_t k = 1; k + 1 < polygon.size(); ++k)
   {
     const Polygon triangle{polygon[0], polygon[k], polygon[k + 1]};
     const double jacobian = slave.stretch * twice_area(triangle);
-    for (const auto& [xi, weight, corner] : triangle_rule(triangles ? 3 : 4))
+    for (const auto& [xi, weight, corner] : triangle_rule())
     {
       const PlanePoint point = point_of(triangle, corner.N);
       const FaceValues phi = functions_at(slave.face.shape, slave.x, point, slave.size).N;
@@ -173,7 +172,7 @@ FaceValues whole_area(const SlaveInPlane& slave)
   for (std::size_t k = 1; k + 1 < slave.corners.size(); ++k)
   {
     const Polygon triangle{slave.corners[0], slave.corners[k], slave.corners[k + 1]};
-    for (const auto& [xi, weight, corner] : triangle_rule(3))
+    for (const auto& [xi, weight, corner] : triangle_rule())
     {
       const PlanePoint point = point_of(triangle, corner.N);
       phi += weight * twice_area(triangle) * functions_at(slave.face.shape, slave.x, point, slave.size).N;

@@ -5,7 +5,6 @@
 #include "squeal/mesh/shape_functions.hpp"
 
 #include <cmath>
-#include <map>
 
 namespace squeal
 {
@@ -72,22 +71,16 @@ Rule collapsed(Rule rule, Eigen::Index along, std::initializer_list<Eigen::Index
   return rule;
 }
 
-/// It is exact to degree 2 n - 2.
-Rule on_triangle(int n)
+/// The product rule of n points a direction. It is exact to degree 2 n - 1 on boxes, 2 n - 2 on triangles and 2 n - 3
+/// on tetrahedra; on pyramids for r^a s^b t^k of shapes.cpp with a, b and k + 2 up to 2 n - 1.
+Rule product_rule(Shape shape, int n)
 {
-  return collapsed(to_unit(on_box(n, 2), {0, 1}), 0, {1});
-}
-
-/// It is exact to degree 2 n - 3.
-Rule on_tetrahedron(int n)
-{
-  return collapsed(collapsed(to_unit(on_box(n, 3), {0, 1, 2}), 1, {2}), 0, {1, 2});
-}
-
-/// It is exact for r^a s^b t^k of shapes.cpp with a, b and k + 2 up to 2 n - 1.
-Rule on_pyramid(int n)
-{
-  Rule rule = collapsed(to_unit(on_box(n, 3), {2}), 2, {0, 1});
+  const int corners = corner_count(shape), dimension = dimension_of(shape);
+  Rule rule = on_box(n, dimension);
+  if (corners == 3 || corners == 6) return collapsed(to_unit(rule, {0, 1}), 0, {1});
+  if (corners == 4 && dimension == 3) return collapsed(collapsed(to_unit(rule, {0, 1, 2}), 1, {2}), 0, {1, 2});
+  if (corners != 5) return rule;
+  rule = collapsed(to_unit(rule, {2}), 2, {0, 1});
   for (auto& point : rule) point.xi(2) -= 1; // the apex is the origin
   return rule;
 }
@@ -111,67 +104,57 @@ Rule four_point_tetrahedron()
   return {{{a, a, a}, w}, {{b, a, a}, w}, {{a, b, a}, w}, {{a, a, b}, w}};
 }
 
-/// Evaluates each shape's functions at the points of its rule.
-std::map<Shape, Quadrature> with_shape_functions(const std::map<Shape, Rule>& rules)
+/// The points with the shape's functions.
+Quadrature evaluated(Shape shape, const Rule& rule)
 {
-  std::map<Shape, Quadrature> result;
-  for (const auto& [shape, rule] : rules)
-    for (const auto& [xi, weight] : rule) result[shape].push_back({xi, weight, shape_functions(shape, xi)});
+  Quadrature result;
+  for (const auto& [xi, weight] : rule) result.push_back({xi, weight, shape_functions(shape, xi)});
   return result;
+}
+
+/// The rules of all shapes.
+std::vector<Quadrature> rules_of(Rule (*of)(Shape))
+{
+  std::vector<Quadrature> result;
+  for (int i = 0; i <= static_cast<int>(Shape::hex27); ++i)
+    result.push_back(evaluated(static_cast<Shape>(i), of(static_cast<Shape>(i))));
+  return result;
+}
+
+Rule stiffness_points(Shape shape)
+{
+  if (shape == Shape::wedge6) return extruded(inner_triangle(), 2, 2);
+  if (shape == Shape::tet10) return four_point_tetrahedron();
+  if (shape == Shape::tet4) return {{{0.25, 0.25, 0.25}, 1. / 6}};
+  if (shape == Shape::triangle3) return mid_side_triangle();
+  return product_rule(shape, middles_of(shape).empty() ? 2 : 3);
+}
+
+Rule mass_points(Shape shape)
+{
+  if (shape == Shape::tet4) return four_point_tetrahedron();
+  const bool three = middles_of(shape).empty() || dimension_of(shape) < 3 || shape == Shape::hex20;
+  return product_rule(shape, three ? 3 : 4);
 }
 
 } // namespace
 
 const Quadrature& stiffness_rule(Shape shape)
 {
-  static const auto rules = with_shape_functions({{Shape::hex8, on_box(2, 3)},
-                                                  {Shape::hex20, on_box(3, 3)},
-                                                  {Shape::hex27, on_box(3, 3)},
-                                                  {Shape::wedge6, extruded(inner_triangle(), 2, 2)},
-                                                  {Shape::wedge15, extruded(on_triangle(3), 2, 3)},
-                                                  {Shape::wedge18, extruded(on_triangle(3), 2, 3)},
-                                                  {Shape::pyramid5, on_pyramid(2)},
-                                                  {Shape::pyramid13, on_pyramid(3)},
-                                                  {Shape::pyramid14, on_pyramid(3)},
-                                                  {Shape::tet10, four_point_tetrahedron()},
-                                                  {Shape::tet4, {{{0.25, 0.25, 0.25}, 1. / 6}}},
-                                                  {Shape::quad4, on_box(2, 2)},
-                                                  {Shape::triangle3, mid_side_triangle()}});
-  return rules.at(shape);
+  static const std::vector<Quadrature> rules = rules_of(stiffness_points);
+  return rules[static_cast<std::size_t>(shape)];
 }
 
 const Quadrature& mass_rule(Shape shape)
 {
-  static const auto rules = with_shape_functions({{Shape::hex8, on_box(3, 3)},
-                                                  {Shape::hex20, on_box(3, 3)},
-                                                  {Shape::hex27, on_box(4, 3)},
-                                                  {Shape::wedge6, extruded(on_triangle(3), 2, 3)},
-                                                  {Shape::wedge15, extruded(on_triangle(4), 2, 4)},
-                                                  {Shape::wedge18, extruded(on_triangle(4), 2, 4)},
-                                                  {Shape::pyramid5, on_pyramid(4)},
-                                                  {Shape::pyramid13, on_pyramid(4)},
-                                                  {Shape::pyramid14, on_pyramid(4)},
-                                                  {Shape::tet10, on_tetrahedron(4)},
-                                                  {Shape::tet4, four_point_tetrahedron()},
-                                                  {Shape::quad4, on_box(3, 2)},
-                                                  {Shape::triangle3, on_triangle(3)},
-                                                  {Shape::quad8, on_box(3, 2)},
-                                                  {Shape::quad9, on_box(3, 2)},
-                                                  {Shape::triangle6, on_triangle(3)}});
-  return rules.at(shape);
+  static const std::vector<Quadrature> rules = rules_of(mass_points);
+  return rules[static_cast<std::size_t>(shape)];
 }
 
-const Quadrature& triangle_rule(int n)
+const Quadrature& triangle_rule()
 {
-  static const std::array<Quadrature, 2> rules = []
-  {
-    std::array<Quadrature, 2> result;
-    for (const int points : {3, 4})
-      for (const auto& [xi, weight] : on_triangle(points))
-        result[points - 3].push_back({xi, weight, shape_functions(Shape::triangle3, xi)});
-    return result;
-  }();
-  return rules.at(n - 3);
+  static const Quadrature rule = evaluated(Shape::triangle3, product_rule(Shape::triangle3, 4));
+  return rule;
 }
 
 } // namespace squeal

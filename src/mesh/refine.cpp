@@ -92,7 +92,7 @@ Children children_of(Shape shape, const Middle& middle)
     std::vector<Vector3d> places; // natural coordinates
     for (const auto& [a, b] : child) places.emplace_back((parent[a] + parent[b]) / 2);
     ChildElement& element = children.emplace_back(shape);
-    if (corners == 5 && child.size() == 4) element.shape = mid_sides(shape).empty() ? Shape::tet4 : Shape::tet10;
+    if (corners == 5 && child.size() == 4) element.shape = middles_of(shape).empty() ? Shape::tet4 : Shape::tet10;
     add_middles(element.shape, places);
     for (const Vector3d& place : places)
     {

@@ -184,11 +184,6 @@ std::vector<Vec3> positions_of(const Mesh& mesh, std::span<const int> nodes)
   return x;
 }
 
-std::span<const std::array<int, 2>> mid_sides(Shape shape)
-{
-  return topology(shape).mid_sides;
-}
-
 std::span<const std::array<int, 4>> corner_faces(Shape shape)
 {
   return topology(shape).faces;
@@ -229,23 +224,21 @@ std::vector<std::vector<int>> faces_of(const Element& element)
 
 Face face_on(const Element& element, std::span<const int> corners)
 {
-  const Topology& solid = topology(element.shape);
+  const bool is_full = topology(element.shape).is_full && corners.size() == 4;
   const auto is_its = [&](const Topology& t)
   {
-    return t.dimension == 2 && t.corners.size() == corners.size() && t.mid_sides.empty() == solid.mid_sides.empty() &&
-           t.is_full == (solid.is_full && corners.size() == 4);
+    return t.dimension == 2 && t.corners.size() == corners.size() && t.is_full == is_full &&
+           t.mid_sides.empty() == topology(element.shape).mid_sides.empty();
   };
   Face face{static_cast<Shape>(std::ranges::find_if(topologies, is_its) - topologies.begin()), {}, false};
-  auto* next = std::ranges::copy(corners, face.nodes.begin()).out;
-  const auto own = nodes_of(element);
-  for (const std::vector<int>& middle : middles_of(face.shape))
-    for (std::size_t i = solid.corners.size(); const std::vector<int>& other : middles_of(element.shape))
-    {
-      const int node = own[i++];
-      const auto has = [&](int k) { return std::ranges::find(other, k, [&](int c) { return own[c]; }) != other.end(); };
-      if (other.size() == middle.size() && std::ranges::all_of(middle, has, [&](int c) { return corners[c]; }))
-        *next++ = node;
-    }
+  const std::vector<Eigen::Vector3d> places = natural_positions(element.shape);
+  std::vector<Eigen::Vector3d> at;
+  for (const int corner : corners)
+    at.push_back(places[std::ranges::find(element.nodes, corner) - element.nodes.begin()]);
+  add_middles(face.shape, at);
+  std::ranges::transform(at, face.nodes.begin(),
+                         [&](const Eigen::Vector3d& place)
+                         { return element.nodes[std::ranges::find(places, place) - places.begin()]; });
   return face;
 }
 
@@ -279,9 +272,9 @@ std::vector<Eigen::Vector3d> natural_positions(Shape shape)
 Eigen::Vector3d middle_of(Shape shape)
 {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  const auto corners = topology(shape).corners;
-  for (const auto& [a, b, c] : corners) sum += Eigen::Vector3d(a, b, c);
-  return sum / static_cast<double>(corners.size());
+  const std::vector<Eigen::Vector3d> places = natural_positions(shape);
+  for (const Eigen::Vector3d& place : places) sum += place / static_cast<double>(places.size());
+  return sum;
 }
 
 ShapeFunctions shape_functions(Shape shape, const Eigen::Vector3d& xi)

@@ -106,9 +106,9 @@ TEST_CASE("children fill their parent, curved as it is")
     CHECK(divided.elements.size() == (shell ? 4 : corner_count(reference.shape) == 5 ? 10 : 8));
     const auto parts = moments(divided);
     // The rule of a curved parent is not exact; that of its children has 1/64 of the error and less.
-    const double inexact = mid_sides(reference.shape).empty() ? 1e-14 : 2e-4;
+    const double inexact = middles_of(reference.shape).empty() ? 1e-14 : 2e-4;
     CHECK(parts[0] == doctest::Approx(whole[0]).epsilon(inexact));
-    if (!mid_sides(reference.shape).empty()) continue;
+    if (!middles_of(reference.shape).empty()) continue;
     refine(file, 1);
     const auto again = moments(mesh_of(file, shell));
     CHECK(again[0] == doctest::Approx(parts[0]).epsilon(1e-14));
@@ -191,7 +191,7 @@ TEST_CASE("quadratic tetrahedra of gmsh are divided without gaps")
   for (const Element& e : fine.elements)
   {
     for (int i = 0; i < 4; ++i) corners.insert(e.nodes[i]);
-    for (const auto& [a, b] : mid_sides(e.shape)) edges.insert(std::minmax(e.nodes[a], e.nodes[b]));
+    for (const auto& ends : middles_of(e.shape)) edges.insert(std::minmax(e.nodes[ends[0]], e.nodes[ends[1]]));
     for (const auto& face : corner_faces(e.shape))
     {
       std::array<int, 3> key{e.nodes[face[0]], e.nodes[face[1]], e.nodes[face[2]]};

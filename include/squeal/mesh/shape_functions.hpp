@@ -32,7 +32,7 @@ std::vector<Eigen::Vector3d> natural_positions(Shape shape);
 /// Appends the nodes between corners to the corners' places.
 void add_middles(Shape shape, std::vector<Eigen::Vector3d>& corners);
 
-/// Natural coordinates of the mean of the corners.
+/// Natural coordinates of the mean of the nodes.
 Eigen::Vector3d middle_of(Shape shape);
 
 /// Returns the shape functions at the natural coordinates xi. Those of shells and faces depend on xi(0), xi(1) alone.
@@ -67,10 +67,7 @@ std::span<const int> nodes_of(const Face& face);
 /// Returns where nodes are [m].
 std::vector<Vec3> positions_of(const Mesh& mesh, std::span<const int> nodes);
 
-/// Returns the two end nodes of the side of each mid-side node, in the order of the mid-side nodes.
-std::span<const std::array<int, 2>> mid_sides(Shape shape);
-
-/// Returns the corners that each further node is in the middle of: 2 of a side, 4 of a face, 8 of a box.
+/// Returns the corners that each further node is in the middle of: 2 of a side, then 4 of a face, 8 of a box.
 const std::vector<std::vector<int>>& middles_of(Shape shape);
 
 /// Returns the corners of each face of a solid, counter-clockwise seen from outside. A triangle has -1 as its fourth.
@@ -115,8 +112,8 @@ const Quadrature& stiffness_rule(Shape shape);
 /// face, whether its sides are straight or curved.
 const Quadrature& mass_rule(Shape shape);
 
-/// Returns the rule of n x n points on the unit triangle, n = 3 or 4, with the functions of a 3-node triangle. It is
-/// exact to degree 2 n - 2.
-const Quadrature& triangle_rule(int n);
+/// Returns the rule of 4 x 4 points on the unit triangle, with the functions of a 3-node triangle. It is exact to
+/// degree 6.
+const Quadrature& triangle_rule();
 
 } // namespace squeal
