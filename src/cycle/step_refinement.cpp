@@ -59,27 +59,25 @@ struct FineShooting
   CycleProblem& problem;
   CycleOptions options; // without a verdict, which the last cycle alone is given
   double accuracy = 0;
-  bool exact = false; // the iteration's steps
+  bool exact = false; // steps of the iteration
 
-  /// Shoots until what further steps would change is below half of the accuracy. Where the steps are exact it is below
-  /// a twentieth, unless that stalls: cycles on two grids are compared.
+  /// Shoots until what further steps would change is below half of the accuracy; where the steps are exact below a
+  /// twentieth, unless that stalls: cycles on two grids are compared.
   LimitCycle cycle_near(const Owned<Vec>& state, double period, int steps, const Convergence& before)
   {
     const int own = std::exchange(problem.settings.steps_per_period, steps);
-    ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), period};
-    start.is_cycle = true;
     const Finally restore([&] { problem.settings.steps_per_period = own; });
     const int free_periods = has_undriven_pairs(problem.sliding.interface) ? 1 : 0; // until none slips one way
-    const auto search = [&](double error, const Convergence& past) {
-      return find_cycle_from(problem, options, start, {0, free_periods, error, false, "cycle, finer steps", past});
+    const auto shoot_to = [&](double target_error, Vec from, double first_period, const Convergence& so_far)
+    {
+      ShootingStart start{problem.sliding.equilibrium.u, displacement(from), velocity(from), first_period};
+      start.is_cycle = true;
+      return find_cycle_from(problem, options, start,
+                             {0, free_periods, target_error, false, "cycle, finer steps", so_far});
     };
-    LimitCycle cycle = search(exact ? accuracy / 20 : accuracy / 2, before);
+    LimitCycle cycle = shoot_to(accuracy / (exact ? 20 : 2), state, period, before);
     if (!exact || cycle.ending != StageEnding::stalled) return cycle;
-    const Orbit stalled = std::move(cycle.orbit);
-    start.u = displacement(stalled.state);
-    start.v = velocity(stalled.state);
-    start.period = stalled.period;
-    return search(accuracy / 2, cycle.convergence);
+    return shoot_to(accuracy / 2, cycle.orbit.state, cycle.orbit.period, cycle.convergence);
   }
 
   /// Whether a motion that starts on the cycle leaves it at `steps` steps a period: in the end it comes back less near
@@ -92,16 +90,15 @@ struct FineShooting
     map.reactions = problem.sliding.equilibrium.reactions;
     const Flow flow = flow_of(map);
     const Preconditioner none;
-    const OrbitProblem free_motion =
-        problem_of(flow, none, {problem.sliding.equilibrium.u, nullptr, nullptr, cycle.orbit.period}, 0);
-    Progress progress(comm_of(problem.sliding.equilibrium.u), "cycle, finer steps", seen);
-    ConvergenceLog log{progress, std::move(cycle.convergence)};
-    const Vec state = cycle.orbit.state;
-    const double period = cycle.orbit.period;
-    const double first = return_residual(free_motion, evaluate(free_motion, log, state, period));
-    const Orbit free = integrate_free_periods(free_motion, log, state, period, {seen});
+    const Orbit& orbit = cycle.orbit;
+    const OrbitProblem around =
+        problem_of(flow, none, {problem.sliding.equilibrium.u, nullptr, nullptr, orbit.period}, 0);
+    Progress progress(comm_of(orbit.state), "cycle, finer steps", seen);
+    ConvergenceLog log{progress, cycle.convergence};
+    const double first = return_residual(around, evaluate(around, log, orbit.state, orbit.period));
+    const Orbit free = integrate_free_periods(around, log, orbit.state, orbit.period, {seen});
     cycle.convergence = std::move(log.convergence);
-    return !(return_residual(free_motion, free) <= std::max(first, beside));
+    return !(return_residual(around, free) <= std::max(first, beside));
   }
 
   /// The changes of a cycle on a grid of time that begins half a step later; none where no cycle is found there. Adds
@@ -122,11 +119,13 @@ struct FineShooting
   }
 };
 
-/// The coarse cycle as one that was not found, since only its own steps know it. The motion goes on at twice as many
-/// steps from beside it: on a cycle that repels it would stay for hundreds of periods.
-void leave(LimitCycle& cycle, Vec equilibrium)
+/// The cycle as one that was not found, since only its own steps know it. The motion goes on at twice as many steps
+/// from beside it: on a cycle that repels it would stay for hundreds of periods.
+void leave(FittedCycle& found, Vec equilibrium)
 {
   constexpr double smaller = 0.9; // than the cycle, about the equilibrium: contact opens no further
+  LimitCycle& cycle = found.cycle;
+  Fidelity& fidelity = found.fidelity;
   cycle.outcome.kind = OutcomeKind::not_periodic;
   cycle.outcome.reason = format("a cycle at %d steps a period that finer ones do not know", cycle.steps_per_period);
   cycle.free = copy_of(cycle.orbit);
@@ -134,6 +133,8 @@ void leave(LimitCycle& cycle, Vec equilibrium)
   check(VecAXPY(displacement(cycle.free.state), 1 - smaller, equilibrium));
   cycle.steps_per_period *= 2;
   cycle.multipliers = {};
+  fidelity.frequency_error = fidelity.energy_error = std::nan("");
+  fidelity.step_frequency_error = fidelity.step_energy_error = std::nan("");
 }
 
 /// Puts the finer cycle in the place of the one found, with its errors. What the search and the verdict left stays.
@@ -171,21 +172,22 @@ void refine(FineShooting& shooting, FittedCycle& found)
     if (finer.outcome.kind != OutcomeKind::converged)
     {
       cycle.convergence = std::move(finer.convergence);
-      if (finer.ending != StageEnding::stalled || shooting.is_left(cycle, steps))
-        leave(cycle, shooting.problem.sliding.equilibrium.u);
       if (!accurate)
         found.fidelity.reason = format("the accuracy was not reached in %ld periods of the full model at more steps a "
                                        "period",
                                        cycle.convergence.periods);
+      if (finer.ending != StageEnding::stalled || shooting.is_left(cycle, steps))
+        leave(found, shooting.problem.sliding.equilibrium.u);
       return;
     }
     cycles.push_back(at_steps(finer));
     const int last = cycles[cycles.size() - 2].steps;
-    RelativeChange errors = step_errors_of(cycles), of_grid; // of the place of contact's events in their steps
-    if (largest(errors) <= accuracy / 2) of_grid = shooting.changes_on_moved_grid(finer);
-    errors = {std::max(errors.frequency, of_grid.frequency), std::max(errors.energy, of_grid.energy)};
-    take(std::move(finer), errors, found);
     const bool confirmed = accurate || !shooting.exact;
+    RelativeChange errors = step_errors_of(cycles), of_grid; // of the place of contact's events in their steps
+    if (confirmed && largest(errors) <= accuracy / 2) of_grid = shooting.changes_on_moved_grid(finer);
+    errors.frequency += of_grid.frequency;
+    errors.energy += of_grid.energy;
+    take(std::move(finer), errors, found);
     accurate = largest(errors) <= accuracy / 2;
     if (accurate && confirmed) return;
     if (tries >= most_tries && !accurate)
