@@ -47,25 +47,12 @@ StickSlipOperator make_stick_slip_operator(MatrixXd N, MatrixXd M, const VectorX
   return result;
 }
 
-std::optional<DividedOperator> divided(StickSlipOperator& of)
-{
-  constexpr double dependent = 1e-8; // forces would lose as many digits
-  Eigen::PartialPivLU<MatrixXd> by(of.M);
-  // a pivot of zero has no estimate of the condition
-  if (!(pivot_ratio(by) > dependent && by.rcond() > dependent)) return std::nullopt;
-  of.N = by.solve(of.N).eval();
-  of.M.resize(0, 0);
-  return DividedOperator{std::move(of), std::move(by)};
-}
-
 struct StatusFactors
 {
   std::vector<Matrix3d> laws;        // J of each pair
   double spring = 0;                 // [N/m] across rows
-  std::vector<std::size_t> unknown;  // pairs of the system; the others stick and leave it
-  std::vector<Index> rows, stuck;    // of the former, and of the latter
   bool regular = true;               // no row was mended
-  Eigen::PartialPivLU<MatrixXd> own; // of `rows`
+  Eigen::PartialPivLU<MatrixXd> own; // M R - N W
 };
 
 namespace
@@ -83,10 +70,7 @@ MatrixXd columns_by(const StickSlipOperator& of, std::size_t pair, const Matrix3
   const PairRows<Index> pair_rows(of.directions);
   const Index own = pair_rows.per_pair(), first = pair_rows.normal(static_cast<Index>(pair));
   MatrixXd columns = of.N.middleCols(first, own).lazyProduct(-W.topLeftCorner(own, own));
-  if (of.M.size() > 0)
-    columns.noalias() += of.M.middleCols(first, own).lazyProduct(R.topLeftCorner(own, own));
-  else
-    columns.middleRows(first, own) += R.topLeftCorner(own, own);
+  columns.noalias() += of.M.middleCols(first, own).lazyProduct(R.topLeftCorner(own, own));
   return columns;
 }
 
@@ -103,17 +87,6 @@ MatrixXd motions_by(const StickSlipOperator& of, const std::vector<Matrix3d>& la
         motion_law(of, pair, laws[pair]).topLeftCorner(own, own).lazyProduct(y.middleRows(first, own));
   }
   return w;
-}
-
-/// (M R - N W)^-1 times columns, by the laws of the factors.
-MatrixXd solved(const StickSlipOperator& of, const StatusFactors& by, const MatrixXd& columns)
-{
-  MatrixXd y = MatrixXd::Zero(columns.rows(), columns.cols());
-  if (!by.rows.empty()) y(by.rows, Eigen::all) = by.own.solve(MatrixXd(columns(by.rows, Eigen::all))).eval();
-  if (by.stuck.empty()) return y;
-  const MatrixXd forces = columns + of.N * motions_by(of, by.laws, y);
-  y(by.stuck, Eigen::all) = forces(by.stuck, Eigen::all);
-  return y;
 }
 
 } // namespace
@@ -175,7 +148,7 @@ bool StatusSystem::differ_by_rank(double near)
   }
   laws_ = std::move(laws);
   if (pairs.empty()) return true;
-  by_changes_ = solved(of_, *factors_, changes);
+  by_changes_ = factors_->own.solve(changes);
   own_.compute(MatrixXd::Identity(count, count) + by_changes_(changed_, Eigen::all));
   return true;
 }
@@ -184,22 +157,13 @@ void StatusSystem::factor(double spring)
 {
   const PairRows<Index> rows(of_.directions);
   const Index own = rows.per_pair();
-  StatusFactors made{laws_, spring, {}, {}, {}, true, {}};
+  StatusFactors made{laws_, spring, true, {}};
+  MatrixXd matrix(of_.N.rows(), of_.N.rows());
   for (std::size_t pair = 0; pair < laws_.size(); ++pair)
   {
-    const bool leaves = of_.M.size() == 0 && laws_[pair].topLeftCorner(own, own).isIdentity(0);
-    if (!leaves) made.unknown.push_back(pair);
-    for (Index k = 0; k < own; ++k)
-      (leaves ? made.stuck : made.rows).push_back(rows.normal(static_cast<Index>(pair)) + k);
-  }
-  const auto size = static_cast<Index>(made.rows.size());
-  MatrixXd matrix(size, size);
-  for (std::size_t i = 0; i < made.unknown.size(); ++i)
-  {
-    const std::size_t pair = made.unknown[i];
-    const Index to = rows.normal(static_cast<Index>(i));
+    const Index to = rows.normal(static_cast<Index>(pair));
     const Matrix3d W = motion_law(of_, pair, laws_[pair]);
-    matrix.middleCols(to, own) = columns_by(of_, pair, laws_[pair] - spring * W, W)(made.rows, Eigen::all);
+    matrix.middleCols(to, own) = columns_by(of_, pair, laws_[pair] - spring * W, W);
     for (Index k = to; k < to + own; ++k) // a row in which neither side moves leaves its friction open: it stays
       if (matrix.col(k).isZero(0))
       {
@@ -207,7 +171,7 @@ void StatusSystem::factor(double spring)
         made.regular = false;
       }
   }
-  if (size > 0)
+  if (matrix.size() > 0)
   {
     made.own.compute(matrix);
     if (!(pivot_ratio(made.own) > 1e-13))
@@ -224,7 +188,7 @@ void StatusSystem::factor(double spring)
 
 StickSlipState StatusSystem::response(const VectorXd& rhs) const
 {
-  VectorXd y = solved(of_, *factors_, -rhs);
+  VectorXd y = factors_->own.solve(-rhs);
   if (!changed_.empty()) y -= by_changes_ * own_.solve(y(changed_));
   StickSlipState result{y, motions_by(of_, laws_, y)};
   const PairRows<Index> rows(of_.directions);
@@ -239,8 +203,7 @@ StickSlipState StatusSystem::response(const VectorXd& rhs) const
 
 StickSlipState StatusSystem::change(const VectorXd& rhs, const Softening& soft) const
 {
-  StickSlipState result =
-      response(rhs - of_.N * particular_.w + of_.times_M(particular_.r - soft.spring * particular_.w));
+  StickSlipState result = response(rhs - of_.N * particular_.w + of_.M * (particular_.r - soft.spring * particular_.w));
   result.r += particular_.r;
   result.w += particular_.w;
   return result;
@@ -249,13 +212,12 @@ StickSlipState StatusSystem::change(const VectorXd& rhs, const Softening& soft) 
 int StatusSystem::index() const
 {
   const auto negative = (factors_->own.matrixLU().diagonal().array() < 0).count();
-  return factors_->rows.empty() || factors_->own.permutationP().determinant() * (negative % 2 == 0 ? 1 : -1) > 0 ? 1
-                                                                                                                 : -1;
+  return factors_->own.permutationP().determinant() * (negative % 2 == 0 ? 1 : -1) > 0 ? 1 : -1;
 }
 
 double StatusSystem::reciprocal_condition() const
 {
-  return factors_->rows.empty() ? 1 : pivot_ratio(factors_->own);
+  return pivot_ratio(factors_->own);
 }
 
 } // namespace squeal

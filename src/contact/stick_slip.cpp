@@ -18,9 +18,8 @@ constexpr double tight = 1e-12, good = 1e-9; // of the residual: where iteration
 /// |N w - q - M r| over the part of load and reactions in it. Motions are no measure: bodies that nothing holds go far.
 double imbalance(const StickSlipOperator& of, const VectorXd& q, const StickSlipState& at)
 {
-  const double per_force = of.M.size() > 0 ? of.compliance : 1,
-               scale = std::max(q.lpNorm<Eigen::Infinity>(), per_force * at.r.lpNorm<Eigen::Infinity>());
-  return scale > 0 ? (of.N * at.w - q - of.times_M(at.r)).lpNorm<Eigen::Infinity>() / scale : 0;
+  const double scale = std::max(q.lpNorm<Eigen::Infinity>(), of.compliance * at.r.lpNorm<Eigen::Infinity>());
+  return scale > 0 ? (of.N * at.w - q - of.M * at.r).lpNorm<Eigen::Infinity>() / scale : 0;
 }
 
 } // namespace
@@ -59,7 +58,7 @@ struct Increment
   /// The rest of N w = q + M r, with springs from another state on.
   VectorXd rest(const StickSlipState& at, double spring, const VectorXd& from) const
   {
-    return q - of.N * at.w + of.times_M(at.r - spring * (at.w - from));
+    return q - of.N * at.w + of.M * (at.r - spring * (at.w - from));
   }
 
   /// Whether iterations end here: there is a solution, or none to be had.
@@ -74,8 +73,7 @@ struct Increment
   /// The sum of squares that a smoothed step lessens [N^2].
   double merit(const StickSlipState& at, double smooth, const VectorXd& lacking) const
   {
-    const double per_force = of.M.size() > 0 ? of.compliance : 1;
-    return PairStates{of, friction, at, smooth}.defects().squaredNorm() + (lacking / per_force).squaredNorm();
+    return PairStates{of, friction, at, smooth}.defects().squaredNorm() + (lacking / of.compliance).squaredNorm();
   }
 
   /// The part of a step by which the merit falls from that where `now` is lacking; `least` where no part lessens it.
@@ -118,7 +116,7 @@ void Increment::by_smoothing(StickSlipState at)
 {
   constexpr int most = 200;
   constexpr double sharper = 0.1, least_part = 0x1p-12, least = 1e-15;
-  const double first = of.motion(q) / of.compliance, pairs = static_cast<double>(of.rho.size());
+  const double first = q.lpNorm<Eigen::Infinity>() / of.compliance, pairs = static_cast<double>(of.rho.size());
   Softening soft{first, 1 / of.compliance};
   VectorXd from = at.w;
   const auto lacking = [&] { return rest(at, soft.spring, from); };
@@ -148,7 +146,7 @@ StickSlipSolution solve_stick_slip(const StickSlipOperator& of, const StickSlipF
 {
   Increment increment{of, friction, q, factors, {guess, 0, std::numeric_limits<double>::infinity(), false}};
   increment.by_statuses(guess);
-  if (increment.best.converged || of.motion(q) == 0) return increment.best;
+  if (increment.best.converged || q.isZero(0)) return increment.best;
   increment.by_smoothing(guess);
   increment.by_statuses(StickSlipState(increment.best.state));
   return increment.best;

@@ -205,28 +205,18 @@ std::string mechanism(const PathProblem& problem, const PathWalk& walk, const In
 struct EndOfPath
 {
   StickSlipOperator of{};
-  std::optional<Eigen::PartialPivLU<MatrixXd>> by{}; // M of the operator, where it is divided
   StickSlipFriction friction{};
   double least_force = 0;
   std::optional<StatusSystem> system{};
   Found found{};
-
-  VectorXd divided(const VectorXd& q) const { return by ? VectorXd(by->solve(q)) : q; }
 };
 
 /// On rank 0.
-void walk_to_end(const PathOperators& operators, const Interface& interface, std::vector<PathEnd> ends,
+void walk_to_end(const PathOperators& operators, const Interface& interface, const std::vector<PathEnd>& ends,
                  const PathStart& start, EndOfPath& end)
 {
   end.of = operator_of(operators, interface);
-  if (std::optional<DividedOperator> stiff = operators.driven ? std::nullopt : divided(end.of))
-  {
-    end.of = std::move(stiff->of);
-    end.by = std::move(stiff->by);
-  }
-  for (PathEnd& step : ends) step.q = end.divided(step.q);
-  const PathProblem problem{end.of, end.by ? 1 : operators.held.kappa, interface.gap, friction_of(operators, interface),
-                            ends};
+  const PathProblem problem{end.of, operators.held.kappa, interface.gap, friction_of(operators, interface), ends};
   const PathWalk walk = operators.driven ? rest_of(problem, start.closed)
                         : start.state    ? hold_at(problem, *start.state)
                                          : walk_path(problem);
@@ -279,7 +269,7 @@ void settle(const PathOperators& operators, const Structure& structure, const In
     on_rank_zero(comm,
                  [&]
                  {
-                   const StickSlipState change = end.system->response(end.divided(error));
+                   const StickSlipState change = end.system->response(error);
                    found.r = as_list(as_vector(found.r) + change.r);
                    found.w = as_list(as_vector(found.w) + change.w);
                  });

@@ -119,10 +119,10 @@ Advance advance_to(const PathProblem& problem, const Place& place, double size, 
 }
 
 /// A motion of the rows that counts as one beside this load [m].
-double least_move(const StickSlipOperator& of, const VectorXd& q)
+double least_move(const VectorXd& q)
 {
   constexpr double rounding = 1e-9;
-  return rounding * of.motion(q);
+  return rounding * q.lpNorm<Eigen::Infinity>();
 }
 
 /// The sentence of a walk that ends at a part of a step.
@@ -139,7 +139,7 @@ std::string end_of(const PathProblem& problem, const PathWalk& walk, Advance las
 /// as far as in the walk `before`: an increment that is shorter must move them less.
 PathWalk walk_in_parts(const PathProblem& problem, int parts, const PathWalk& before)
 {
-  const double most = before.completed ? std::max(0.75 * before.largest_move, least_move(problem.of, before.q))
+  const double most = before.completed ? std::max(0.75 * before.largest_move, least_move(before.q))
                                        : std::numeric_limits<double>::infinity();
   PathWalk walk = unloaded(problem);
   walk.factors = before.factors;
@@ -217,7 +217,7 @@ PathWalk rest_of(const PathProblem& problem, const std::vector<char>& expected)
   walk.q = load_at(problem, {0, 1}) + problem.of.N * walk.offset;
   walk.state.w.setZero(); // all closed
   for (Index i = 0; expected.size() == problem.gap.size() && i < walk.q.size(); ++i)
-    if (!expected[static_cast<std::size_t>(i)]) walk.state.w[i] = problem.of.motion(walk.q);
+    if (!expected[static_cast<std::size_t>(i)]) walk.state.w[i] = walk.q.lpNorm<Eigen::Infinity>();
   const auto rests = [&] {
     return advance_to(problem, {0, 1}, 1, std::numeric_limits<double>::infinity(), walk) == Advance::done;
   };
@@ -247,8 +247,7 @@ PathWalk walk_path(const PathProblem& problem)
   PathWalk finer = walk_in_parts(problem, 2 * first_parts, walk);
   finer.iterations += walk.iterations;
   if (finer.completed)
-    finer.change = change_between(problem.of, walk.state.r, finer.state.r,
-                                  least_move(problem.of, finer.q) / problem.of.compliance);
+    finer.change = change_between(problem.of, walk.state.r, finer.state.r, least_move(finer.q) / problem.of.compliance);
   return finer;
 }
 

@@ -4,6 +4,7 @@
 #include "squeal/solid/structure.hpp"
 #include "../support/approx.hpp"
 #include "../support/bricks.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 #include "squeal/solid/binary.hpp"
 
 #include <algorithm>
@@ -151,7 +152,7 @@ TEST_CASE("points, springs and dashpots give the oscillator's matrices")
   scene.forces = {{"pad", {0, -1, 0}}};
   Mesh mesh;
   add_points(mesh, scene);
-  const Partition partition{std::vector<int>{0, ranks_of(world) - 1}, {}};
+  const Partition partition{std::vector<int>{0, ranks_of(world) - 1}};
   const DofMap dofs = number_dofs(mesh, scene, partition, world);
   const Structure structure = assemble({mesh, partition, dofs}, scene, world);
   REQUIRE(dofs.size == 3); // pad x, pad y, disc y

@@ -6,14 +6,11 @@
 ///     driven: r_t = mu r_n e.
 /// Where all pairs are driven, rows are normal ones alone: M then holds the friction.
 /// Semismooth Newton on the statuses. A status leaves each pair as many unknowns as it has rows, and a linear system.
-/// Where M can be divided by, r = M^-1 N w - M^-1 q: pairs that stick have w = 0 and leave the system, which a joint of
-/// thousands that mostly stick would fill.
 /// The step in time has the same law with velocities for displacements. Arithmetic of one rank.
 #include "squeal/contact/pair_law.hpp"
 
 #include <Eigen/LU>
 #include <memory>
-#include <optional>
 
 namespace squeal
 {
@@ -21,37 +18,19 @@ namespace squeal
 /// The matrices that increments share.
 struct StickSlipOperator
 {
-  Eigen::MatrixXd N, M; // rows x rows; M empty: identity
+  Eigen::MatrixXd N, M; // rows x rows
   int directions = 1;
   std::vector<NaturalScale> rho; // [N/m] of each pair, by its own block of M
   double compliance = 0;         // [m/N] the largest of a row
   std::vector<int> contact;      // number of each pair's: reactions are judged by the largest of their contact
 
-  Eigen::VectorXd times_M(const Eigen::VectorXd& r) const { return M.size() > 0 ? Eigen::VectorXd(M * r) : r; }
-
-  /// The size of a right-hand side as a motion [m].
-  double motion(const Eigen::VectorXd& q) const
-  {
-    return (M.size() > 0 ? 1 : compliance) * q.lpNorm<Eigen::Infinity>();
-  }
-
   /// A force [N] that counts as one beside this right-hand side, where a contact is about to open.
-  double least_force(const Eigen::VectorXd& q) const { return 1e-6 * motion(q) / compliance; }
+  double least_force(const Eigen::VectorXd& q) const { return 1e-6 * q.lpNorm<Eigen::Infinity>() / compliance; }
 };
 
 /// `own`: compliance of each row to its own force without friction [m/N]; `contact`: as above.
 StickSlipOperator make_stick_slip_operator(Eigen::MatrixXd N, Eigen::MatrixXd M, const Eigen::VectorXd& own,
                                            int directions, std::vector<int> contact);
-
-/// The operator with N and q divided by M.
-struct DividedOperator
-{
-  StickSlipOperator of;
-  Eigen::PartialPivLU<Eigen::MatrixXd> by; // M
-};
-
-/// Nothing where rows of M depend on each other. Takes `of`, or leaves it as it is.
-std::optional<DividedOperator> divided(StickSlipOperator& of);
 
 /// The friction of the pairs in one increment.
 struct StickSlipFriction

@@ -13,7 +13,7 @@ namespace squeal
 struct PathEnd
 {
   std::string name;
-  Eigen::VectorXd q;          // [m] motion of the rows by the load alone; divided by M as its operator is
+  Eigen::VectorXd q;          // [m] motion of the rows by the load alone
   double driven_friction = 1; // [-] on the coefficients of driven pairs
 };
 
@@ -21,7 +21,7 @@ struct PathEnd
 struct PathProblem
 {
   const StickSlipOperator& of;
-  double kappa = 0;           // [N/m] of the springs across all rows: N = 1 - kappa D; 1 where N and q are divided by M
+  double kappa = 0;           // [N/m] of the springs across all rows: N = 1 - kappa D
   std::vector<double> gap;    // [m] per pair
   StickSlipFriction friction; // at the factor 1
   std::vector<PathEnd> ends;
