@@ -22,7 +22,7 @@ Owned<Mat> on_pair_rows(const Interface& interface, const std::vector<char>& clo
   };
   for (std::size_t i = 0; i < closed.size(); ++i)
     if (closed[i]) add_pair(i, rows.normal(static_cast<PetscInt>(i)), set);
-  return any ? matrix_of_rows(own, last - first, comm_of(interface.B)) : Owned<Mat>();
+  return any ? matrix_of_rows(own, range.size(), comm_of(interface.B)) : Owned<Mat>();
 }
 
 } // namespace
