@@ -26,6 +26,12 @@ constexpr double guards_of_pairs = 0.3; // neighbours in a space, over its modes
 constexpr double residual_share = 1e-2; // a pass divides residuals by about ten: a quarter of them stay
 constexpr double near_end = 0.98;       // of |lambda|: from there on pairs may leave
 
+/// Number of eigenvalues of the symmetric problem below theta.
+int inertia_below(const PairProblem& problem, double theta, const PencilOptions& options)
+{
+  return inertia_at(theta, problem.M_z, problem.K_z, options, elimination_order(problem.K_z)).below;
+}
+
 PairSearch empty_search(double top)
 {
   return {{{OutcomeKind::converged, "", 0, 0}}, top};
@@ -74,12 +80,22 @@ void add_pairs(const PairProblem& problem, MultiVector basis, const PencilFactor
   std::ranges::move(found.pairs, std::back_inserter(search.solution.pairs));
 }
 
+/// Takes real negative eigenvalues out of the pairs, which then are what grows or vibrates, and notes their moduli.
+void set_decays_apart(PairSearch& search)
+{
+  const auto decays = [](const Eigenpair& pair) { return pair.lambda.imag() == 0 && pair.lambda.real() < 0; };
+  for (const Eigenpair& pair : search.solution.pairs)
+    (decays(pair) ? search.decays : search.moduli).push_back(decays(pair) ? pair.lambda.real() : std::abs(pair.lambda));
+  std::erase_if(search.solution.pairs, decays);
+}
+
 /// All pairs of a small problem.
 void search_whole(const PairProblem& problem, double floor, PairSearch& search)
 {
-  const Window window{floor * floor, search.top * search.top};
+  Window window{floor * floor, search.top * search.top, true};
   search.solution = solve_whole(problem.sliding, nullptr, window);
-  for (const Eigenpair& pair : search.solution.pairs) search.moduli.push_back(std::abs(pair.lambda));
+  set_decays_apart(search);
+  window.has_decays = false;
   if (problem.K_loss) search.solution = solve_whole(problem.sliding, problem.K_loss, window);
 }
 
@@ -120,12 +136,13 @@ void search_slices(const PairProblem& problem, double floor, const PencilOptions
 void search_by_toar(const PairProblem& problem, double floor, const ModesOptions& options, PairSearch& search)
 {
   const double shift = std::sqrt(-shift_below_zero(problem.M_z, problem.K_z));
-  QuadraticSolution found = solve_quadratic(
-      problem.sliding, {search.top / two_pi, shift / search.top, static_cast<int>(search.omega.size())});
+  QuadraticSolution found =
+      solve_quadratic(problem.sliding, {search.top / two_pi, shift / search.top,
+                                        std::max(search.expected, static_cast<int>(search.omega.size()))});
   if (!problem.K_loss)
   {
-    for (const Eigenpair& pair : found.pairs) search.moduli.push_back(std::abs(pair.lambda));
     search.solution = std::move(found);
+    set_decays_apart(search);
     return;
   }
   ShiftInvert pencil = make_shift_invert(problem.K_z, problem.M_z, Keep::factor, options.pencil);
@@ -140,7 +157,7 @@ PairSearch search_pairs(const PairProblem& problem, ModesMethod method, double b
 {
   const PetscInt n = row_count(problem.K_z);
   const double floor = std::sqrt(vibration_floor(norms_of(problem.sliding)));
-  const bool by_slices = n > options.dense_limit && method != ModesMethod::toar;
+  const bool by_slices = n > options.dense_limit && method != ModesMethod::toar && !problem.is_indefinite;
   PairSearch search = empty_search(two_pi * band * (by_slices ? reach_of_count : 1));
   const auto find_real = [&]
   { search.omega = solve_real_modes_below(problem.M_z, problem.K_z, search.top / two_pi, options).omega; };
@@ -151,7 +168,11 @@ PairSearch search_pairs(const PairProblem& problem, ModesMethod method, double b
   }
   else
   {
-    find_real();
+    if (!problem.is_indefinite)
+      find_real();
+    else if (n > options.dense_limit)
+      search.expected = inertia_below(problem, search.top * search.top, options.pencil) -
+                        inertia_below(problem, -search.top * search.top, options.pencil);
     n > options.dense_limit ? search_by_toar(problem, floor, options, search) : search_whole(problem, floor, search);
   }
   sort_and_measure(search.solution);
@@ -160,7 +181,7 @@ PairSearch search_pairs(const PairProblem& problem, ModesMethod method, double b
 
 ModeCount count_pairs(const PairSearch& search, double floor, double least)
 {
-  const auto& [solution, top, unsorted, omega, counted] = search;
+  const auto& [solution, top, decays, unsorted, omega, counted] = search;
   std::vector<double> moduli = unsorted;
   std::ranges::sort(moduli, std::greater{});
   const auto number = [](const std::vector<double>& values, double from, double end) {
@@ -171,7 +192,8 @@ ModeCount count_pairs(const PairSearch& search, double floor, double least)
     const int expected = number(omega, floor, edge), found = number(moduli, 0, edge);
     return ModeCount{expected == found ? Certificate::inertia : Certificate::none, edge / two_pi, expected, found};
   };
-  if (omega.empty() && counted == std::ssize(moduli)) return {Certificate::inertia, top / two_pi, counted, counted};
+  const auto all = static_cast<int>(moduli.size());
+  if (omega.empty()) return {counted == all ? Certificate::inertia : Certificate::none, top / two_pi, counted, all};
   const ModeCount whole = below(top);
   if (whole.expected == whole.found) return whole;
   for (std::size_t k = 1; k < moduli.size() && moduli[k - 1] > least; ++k)
@@ -263,7 +285,7 @@ std::string describe_count(const Modes& modes)
   if (modes.count.certified_by == Certificate::all_pairs) return text + "where the whole problem was solved";
   text += format("%d expected by the inertia of the ", modes.count.expected);
   if (!modes.beyond_inertia) return text + "frictionless structure";
-  return text + "symmetric part, which cannot count what gyroscopic or circulatory parts change";
+  return text + "symmetric part, which cannot count what gyroscopic, circulatory or indefinite parts change";
 }
 
 /// Sets what follows from the modes: their order, the numbers of unstable ones, the residual and whether it converged.
@@ -343,16 +365,19 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
   }
   const QuadraticProblem reduced = sliding_problem(sliding.structure, linearised);
   const Owned<Mat> K_loss = sliding_loss(sliding.structure, linearised);
-  const PairSearch found =
-      search_pairs({reduced, K_loss, linearised.M_z, linearised.K_z}, settings.method, settings.band, options);
+  PairProblem problem{reduced, K_loss, linearised.M_z, linearised.K_z};
+  problem.is_indefinite = sliding.structure.elements == 0 && // elements have no negative stiffness
+                          inertia_below(problem, shift_below_zero(problem.M_z, problem.K_z), options.pencil) > 0;
+  modes.beyond_inertia = modes.beyond_inertia || problem.is_indefinite;
+  const PairSearch found = search_pairs(problem, settings.method, settings.band, options);
   modes.modes = modes_of(found.solution, sliding, linearised);
   modes.outcome = found.solution.outcome;
   modes.count = count_pairs(found, std::sqrt(vibration_floor(norms_of(reduced))), 0.8 * two_pi * settings.band);
-  if (modes.beyond_inertia) // where inertia does not count, a problem that is solved whole has all its pairs
-  {
-    modes.count.certified_by = free <= options.dense_limit ? Certificate::all_pairs : Certificate::none;
-    if (free <= options.dense_limit) modes.count.expected = modes.count.found;
-  }
+  modes.decays = found.decays;
+  const bool is_whole = free <= options.dense_limit;
+  if (modes.beyond_inertia) modes.count.certified_by = Certificate::none;
+  if (is_whole && (modes.beyond_inertia || !modes.decays.empty())) // what inertia does not count is solved whole
+    modes.count.certified_by = Certificate::all_pairs, modes.count.expected = modes.count.found;
   drop_beyond_band(modes);
   assess(modes);
   return modes;

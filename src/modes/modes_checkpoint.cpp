@@ -17,9 +17,9 @@ constexpr const char* name_of_search = "modes";
 void describe_search(Checkpoint& checkpoint, Modes& modes)
 {
   std::size_t found = modes.modes.size();
-  describe_all(checkpoint, found, modes.outcome, modes.method, modes.shapes, modes.band, modes.beyond_band,
-               modes.unstable_count, modes.beyond_inertia, modes.count.certified_by, modes.count.frequency,
-               modes.count.expected, modes.count.found, modes.count_check);
+  describe_all(checkpoint, found, modes.outcome, modes.method, modes.shapes, modes.band, modes.decays,
+               modes.beyond_band, modes.unstable_count, modes.beyond_inertia, modes.count.certified_by,
+               modes.count.frequency, modes.count.expected, modes.count.found, modes.count_check);
   modes.modes.resize(found);
 }
 

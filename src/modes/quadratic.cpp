@@ -154,14 +154,15 @@ QuadraticProblem sliding_problem(const Structure& structure, const LinearisedSli
 bool Window::holds(std::complex<double> lambda) const
 {
   const double square = std::norm(lambda);
-  return square >= least && square < limit && (lambda.imag() > 0 || (lambda.imag() == 0 && lambda.real() > 0));
+  return square >= least && square < limit &&
+         (lambda.imag() > 0 || (lambda.imag() == 0 && (has_decays || lambda.real() > 0)));
 }
 
 QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const QuadraticSettings& settings)
 {
   const QuadraticNorms norms = norms_of(problem);
   const double omega = two_pi * settings.band;
-  const Window window{vibration_floor(norms), omega * omega};
+  const Window window{vibration_floor(norms), omega * omega, true};
   QuadraticSolution result = solve_by_toar(problem, settings, window);
   for (Eigenpair& pair : result.pairs)
   {

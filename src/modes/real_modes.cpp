@@ -151,7 +151,7 @@ void to_structure(RealModes& modes, Mat Z)
 
 double shift_below_zero(Mat M, Mat K)
 {
-  return -1e-8 * trace(K) / trace(M);
+  return -1e-8 * std::abs(trace(K)) / trace(M);
 }
 
 Inertia inertia_at(double limit, Mat M, Mat K, const PencilOptions& options, const EliminationOrder& order)

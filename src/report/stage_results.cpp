@@ -115,6 +115,9 @@ void warn_of_modes(Entry out, const Modes& modes, const ModelSummary& model)
     out.warn(Severity::note,
              format("%td of the modes are within 0.01 %% of the threshold: mesh and damping decide their sign",
                     on_the_edge));
+  if (!modes.decays.empty())
+    out.warn(Severity::note, format("%zu real eigenvalues in the band decay, the slowest by %.4g 1/s",
+                                    modes.decays.size(), *std::ranges::max_element(modes.decays)));
   if (modes.count.certified_by == Certificate::none && modes.count.expected != modes.count.found)
     out.warn(Severity::severe, format("%d pairs were found where %d are expected, %s", modes.count.found,
                                       modes.count.expected, count_remedy(modes)));
@@ -199,6 +202,7 @@ void add_modes(Entry out, const Report& report)
   out.add("count_expected", "-", "number of pairs below `count_frequency_hz` by that count", count.expected);
   out.add("count_found", "-", "number of pairs found below it", count.found);
   out.add("count_frequency_hz", "Hz", "where pairs were counted: the band, or just above it", count.frequency);
+  out.add("real_eigenvalues", "1/s", "real negative eigenvalues in the band: overdamped motions", modes.decays);
   out.add("beyond_band_hz", "Hz", "pairs between the band and `count_frequency_hz`", modes.beyond_band);
   const auto& linearised = report.point.linearised;
   const int dependent = linearised ? linearised->contact.dependent_rows : 0;

@@ -168,15 +168,20 @@ def write_state(file, u, v):
     return file
 
 
+def write_sparse(file, A):
+    """PETSc's binary format of a matrix."""
+    A = np.atleast_2d(np.asarray(A, float))
+    rows = [np.flatnonzero(row) for row in A]
+    data = struct.pack(">iiii", 1211216, *A.shape, sum(map(len, rows)))
+    data += np.array([len(row) for row in rows], ">i4").tobytes() + np.concatenate(rows).astype(">i4").tobytes()
+    file.write_bytes(data + A[A != 0].astype(">f8").tobytes())
+
+
 def write_matrices(folder, B, gap, drive, F, **matrices):
     """The folder of a matrix scene: M, C and K by name."""
     folder.mkdir()
     for name, A in dict(matrices, B=B).items():
-        A = np.atleast_2d(np.asarray(A, float))
-        rows = [np.flatnonzero(row) for row in A]
-        data = struct.pack(">iiii", 1211216, *A.shape, sum(map(len, rows)))
-        data += np.array([len(row) for row in rows], ">i4").tobytes() + np.concatenate(rows).astype(">i4").tobytes()
-        (folder / f"{name}.petsc").write_bytes(data + A[A != 0].astype(">f8").tobytes())
+        write_sparse(folder / f"{name}.petsc", A)
     for name, values in {"gap": gap, "drive": drive, "F": F}.items():
         (folder / f"{name}.petsc").write_bytes(_vector(values))
     return folder

@@ -3,7 +3,8 @@
 import itertools
 
 import numpy as np
-from models import write_matrices, write_scene
+import pytest
+from models import write_matrices, write_scene, write_sparse
 
 B = np.array([[0, 1, -1.0, 0], [1, 0, 0, 0]])  # normal and tangential row of one pair
 M = np.diag([1, 1, 0.5, 2])
@@ -79,3 +80,48 @@ def test_bad_maps_and_names_are_refused(squeal, tmp_path):
         assert run.code == 1 and len(run.messages) == 1, run.errors
         for word in words:
             assert word in run.messages[0], run.messages[0]
+
+
+def modes_of_matrices(run, folder, band, ranks, **matrices):
+    """The report of the modes of matrices without pairs."""
+    (folder / "m").mkdir()
+    for name, A in matrices.items():
+        write_sparse(folder / "m" / f"{name}.petsc", A)
+    scene = write_scene(folder, matrices={"folder": "m"}, modes={"band": band}, estimate={"enabled": False})
+    return run(scene, ranks=ranks).report["modes"]
+
+
+def told(modes):
+    """All eigenvalues of a report, ascending by imaginary and real part; conjugates are there once."""
+    found = [complex(mode["growth_rate"], 2 * np.pi * mode["frequency_hz"]) for mode in modes["modes"]]
+    return sorted(found + [complex(value) for value in modes["real_eigenvalues"]], key=lambda value: (value.imag, value.real))
+
+
+def within(exact, band):
+    exact = np.asarray(exact, complex)
+    return sorted(exact[(exact.imag >= 0) & (abs(exact) < 2 * np.pi * band)], key=lambda value: (value.imag, value.real))
+
+
+@pytest.mark.parametrize("stiffness, damping", [((-1.0, 4, 9), (0.01, 0.01, 0.01)), ((1.0, 4, 9), (10, 0.01, 0.01)), ((-1.0, -4, 9), (10, 0.01, 12))])
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_divergence_and_overdamped_motion_are_listed(converged, tmp_path, stiffness, damping, ranks):
+    """Single masses: lambda^2 + c lambda + k = 0. All are found, since the problem is solved whole."""
+    modes = modes_of_matrices(converged, tmp_path, 3.0, ranks, M=np.eye(3), C=np.diag(damping), K=np.diag(stiffness))
+    exact = np.concatenate([np.roots([1, c, k]) for c, k in zip(damping, stiffness)])
+    np.testing.assert_allclose(told(modes), within(exact, 3.0), rtol=1e-12)
+    assert modes["unstable_count"] == sum(k < 0 for k in stiffness) and modes["count_certified_by"] == "all pairs"
+
+
+@pytest.mark.parametrize("circulatory", [0.0, 300.0])
+def test_large_matrices_whose_stiffness_is_indefinite(converged, tmp_path, circulatory):
+    """A chain on negative springs, with a skew part between its ends: every eigenvalue of the band by dense algebra. No count
+    certifies them."""
+    n, band = 450, 8.0
+    K = 1e4 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)) - 300 * np.eye(n)
+    K[0, -1], K[-1, 0] = circulatory, -circulatory
+    modes = modes_of_matrices(converged, tmp_path, band, 2, M=np.eye(n), C=3 * np.eye(n), K=K)
+    exact = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-K, -3 * np.eye(n)]]))
+    exact = within(np.where(abs(exact.imag) < 1e-9, exact.real, exact), band)
+    assert sum(value.real > 0 for value in exact) > 10
+    np.testing.assert_allclose(told(modes), exact, rtol=1e-7)
+    assert modes["count_certified_by"] is None and "cannot count" in modes["count_check"]

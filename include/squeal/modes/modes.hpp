@@ -80,9 +80,10 @@ struct Modes
   ModeShapes shapes = ModeShapes::unstable;
   double band = 0;                 // [Hz] covered: every mode below is here
   std::vector<ComplexMode> modes;  // Im(lambda) >= 0, by falling growth; of unstable ones those that oscillate first
+  std::vector<double> decays;      // [1/s] real negative eigenvalues in the band, where all are found
   std::vector<double> beyond_band; // [Hz] pairs between the band and count.frequency
   int unstable_count = 0;          // of is_unstable, the first ones
-  bool beyond_inertia = false;     // gyroscopic or circulatory parts: the inertia does not count the pairs
+  bool beyond_inertia = false;     // gyroscopic, circulatory or indefinite parts: the inertia does not count the pairs
   ModeCount count;
   std::string count_check; // one sentence: pairs found, and expected by inertia
 
@@ -140,6 +141,7 @@ struct PairProblem
   const QuadraticProblem& sliding; // Y'.Z
   Mat K_loss = nullptr;            // of loss factors, Y'.Z; null: none
   Mat M_z = nullptr, K_z = nullptr;
+  bool is_indefinite = false; // K_z has negative eigenvalues: pairs are not found by slices
 };
 
 /// Pairs, and what counts them.
@@ -147,9 +149,11 @@ struct PairSearch
 {
   QuadraticSolution solution;   // of the problem with losses
   double top = 0;               // [rad/s] everything below is here
+  std::vector<double> decays{}; // real negative lambda [1/s], of problems solved whole and by SLEPc
   std::vector<double> moduli{}; // |lambda| of the pairs without losses [rad/s]
-  std::vector<double> omega{};  // of the real modes [rad/s], ascending; empty where the inertia agrees
-  int expected = 0;             // real modes below the top by that inertia
+  std::vector<double>
+      omega{};      // of the real modes [rad/s], ascending; empty where the inertia agrees or K_z is indefinite
+  int expected = 0; // real modes below the top by that inertia
 };
 
 /// All pairs below the band [Hz] and, for the count, a little beyond. By SLEPc where `method` says so.

@@ -44,6 +44,7 @@ struct Eigenpair
 struct Window
 {
   double least = 0, limit = 0;
+  bool has_decays = false; // real negative lambda, too
   bool holds(std::complex<double> lambda) const;
 };
 
@@ -63,7 +64,7 @@ struct QuadraticSolution
 };
 
 /// The pairs in the band by SLEPc's TOAR. Motions of a free body (|lambda|^2 below 1e-12 |K|/|M|) are no vibration and
-/// are left out, as are real negative lambda. Collective. Error: memory runs out.
+/// are left out. Real negative lambda are among the pairs. Collective. Error: memory runs out.
 QuadraticSolution solve_quadratic(const QuadraticProblem& problem, const QuadraticSettings& settings);
 
 /// Sorts the pairs by falling real part, and sets outcome.residual to the largest backward error. Not collective.
