@@ -62,8 +62,7 @@ public:
       check(VecSetValue(result, i, at(static_cast<std::size_t>(nodal / 6), static_cast<int>(nodal % 6), q),
                         INSERT_VALUES));
     }
-    check(VecAssemblyBegin(result));
-    check(VecAssemblyEnd(result));
+    finish(result);
     return result;
   }
 

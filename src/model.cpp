@@ -108,13 +108,9 @@ void add_damping(Structure& structure, const RayleighDamping& damping)
 void hold(Model& model, const Elimination& elimination)
 {
   Structure& structure = model.structure;
-  for (Owned<Mat>* A : {&structure.M, &structure.C, &structure.K})
-  {
+  for (Owned<Mat>* A : {&structure.M, &structure.C, &structure.K, &structure.G, &structure.H})
     *A = elimination.square(*A);
-    mark_symmetric(*A);
-  }
-  for (Owned<Mat>* A : {&structure.G, &structure.H})
-    if (A->get()) *A = elimination.square(*A);
+  for (const Mat A : {structure.M.get(), structure.C.get(), structure.K.get()}) mark_symmetric(A);
   structure.load = elimination.entries(structure.load);
   for (PathStep& step : structure.path) step.load = elimination.entries(step.load);
   model.interface.B = elimination.columns(model.interface.B);
@@ -165,9 +161,10 @@ Model model_of_matrices(const Scene& scene, MPI_Comm comm)
 }
 
 /// Structure and contact that share all matrices with these.
-BrakeModel sharing(const Structure& own, const Interface& contact)
+Model sharing(const Structure& own, const Interface& contact)
 {
-  BrakeModel result{{}, sharing(contact)};
+  Model result;
+  result.interface = sharing(contact);
   Structure& structure = result.structure;
   for (const auto matrix :
        {&Structure::M, &Structure::C, &Structure::K, &Structure::G, &Structure::H, &Structure::K_loss})
@@ -264,7 +261,7 @@ const NumberedMesh& NearbyModels::numbered(const Scene& scene)
   return *numbered_;
 }
 
-BrakeModel NearbyModels::made_of_mesh(const Scene& scene, const std::set<Effect>& changed)
+Model NearbyModels::made_of_mesh(const Scene& scene, const std::set<Effect>& changed)
 {
   const bool moved = changed.contains(Effect::mesh);
   const auto stays = [&](std::initializer_list<Effect> effects)
@@ -272,7 +269,7 @@ BrakeModel NearbyModels::made_of_mesh(const Scene& scene, const std::set<Effect>
   const bool keeps_stiffness = stays({Effect::stiffness_and_mass}), keeps_rows = stays({Effect::drive});
   if (moved) numbered_.reset();
   const Structure& own = model_.structure;
-  BrakeModel next = sharing(own, model_.interface);
+  Model next = sharing(own, model_.interface);
   Structure& structure = next.structure;
   if (!keeps_stiffness || !stays({Effect::mass, Effect::damping}))
   {
@@ -300,7 +297,7 @@ BrakeModel NearbyModels::made_of_mesh(const Scene& scene, const std::set<Effect>
   return next;
 }
 
-BrakeModel NearbyModels::at(std::span<const SceneNumber> numbers)
+Model NearbyModels::at(std::span<const SceneNumber> numbers)
 {
   const Scene scene = scene_with(scene_, numbers);
   std::set<Effect> changed;
@@ -309,16 +306,13 @@ BrakeModel NearbyModels::at(std::span<const SceneNumber> numbers)
     const Effect effect = description_of(scene_, number.key).effect;
     changed.insert(effect == Effect::nothing ? Effect::mesh : effect); // what it does not say may be everything
   }
-  BrakeModel model;
+  Model model;
   if (!scene.matrices)
     model = made_of_mesh(scene, changed);
   else if (std::ranges::all_of(changed, [](Effect effect) { return effect == Effect::friction; }))
     model = sharing(model_.structure, model_.interface);
   else
-  {
-    Model made = model_of_matrices(scene, comm_);
-    model = {std::move(made.structure), std::move(made.interface)};
-  }
+    model = model_of_matrices(scene, comm_);
   model.interface.friction = friction_of_pairs(scene, model.interface.geometry);
   check_interface(model.interface, "contact", comm_);
   tighten(model.structure, model.interface);

@@ -51,11 +51,7 @@ void add_initial_motions(const Model& model, const Scene& scene, State& state)
                {
                  for (const InitialMotion& initial : scene.initial) set_initial_motion(model, initial, added);
                });
-  for (Vec x : {added.u.get(), added.v.get()})
-  {
-    check(VecAssemblyBegin(x));
-    check(VecAssemblyEnd(x));
-  }
+  for (Vec x : {added.u.get(), added.v.get()}) finish(x);
   check(VecAXPY(state.u, 1, added.u));
   check(VecAXPY(state.v, 1, added.v));
 }

@@ -1,6 +1,6 @@
 #pragma once
 /// The model of a scene: from a mesh, from points and springs, or from matrices; everything after it is the same.
-#include "squeal/contact/model.hpp"
+#include "squeal/contact/interface.hpp"
 #include "squeal/report/report.hpp"
 #include "squeal/scene/numbers.hpp"
 
@@ -24,12 +24,12 @@ public:
 
   /// Structure and contact with these values; all other numbers have the scene's. Collective. Error: as build_model, or
   /// they make no scene.
-  BrakeModel at(std::span<const SceneNumber> numbers);
+  Model at(std::span<const SceneNumber> numbers);
 
   MPI_Comm comm() const { return comm_; }
 
 private:
-  BrakeModel made_of_mesh(const Scene& scene, const std::set<Effect>& changed);
+  Model made_of_mesh(const Scene& scene, const std::set<Effect>& changed);
   const NumberedMesh& numbered(const Scene& scene);
 
   const Model& model_;

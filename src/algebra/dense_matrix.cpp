@@ -18,8 +18,7 @@ using Eigen::MatrixXd;
 
 MatrixXd dense_copy(Mat A)
 {
-  PetscInt rows = 0, columns = 0;
-  check(MatGetSize(A, &rows, &columns));
+  const PetscInt rows = row_count(A), columns = column_count(A);
   Owned<IS> all_rows, all_columns;
   check(ISCreateStride(PETSC_COMM_SELF, rows, 0, 1, all_rows.put()));
   check(ISCreateStride(PETSC_COMM_SELF, columns, 0, 1, all_columns.put()));

@@ -37,7 +37,7 @@ void count_statuses(const std::vector<std::vector<ContactStatus>>& statuses, Poi
 /// The brake at a value of the parameter.
 struct BrakeAt
 {
-  BrakeAt(double value, BrakeModel made, const BrakeBranchProblem& branch)
+  BrakeAt(double value, Model made, const BrakeBranchProblem& branch)
       : parameter(value), model(std::move(made)),
         problem(at_equilibrium(branch.own, {model.structure, model.interface, equilibrium})),
         map{problem.sliding, branch.own.step, branch.steps_per_period, branch.cycle.theta}, flow(flow_of(map))
@@ -46,7 +46,7 @@ struct BrakeAt
   }
 
   double parameter;
-  BrakeModel model;
+  Model model;
   Equilibrium equilibrium{};
   bool equilibrium_known = false;
   CycleProblem problem; // with the modes of the scene's own value

@@ -194,14 +194,6 @@ void ContactOperator::add_product(std::size_t pair, const PairVector& change, st
   add_runs(near_[pair], PairRows<std::size_t>(directions_).per_pair(), change, w.data());
 }
 
-double ContactOperator::near_share() const
-{
-  const auto n = static_cast<double>(size());
-  double entries = 0;
-  for (const NearRow& row : near_) entries += static_cast<double>(row.values.size());
-  return n == 0 ? 0 : entries / (n * n);
-}
-
 double ContactOperator::largest_eigenvalue(std::span<const double> roots, int iterations) const
 {
   std::vector<double> x(size()), scaled(size()), y(size());
@@ -269,8 +261,7 @@ Owned<Vec> uneven_vector(Mat A)
   const auto [first, last] = own_range(x);
   for (PetscInt i = first; i < last; ++i)
     check(VecSetValue(x, i, 1 + 0.5 * std::sin(7. * static_cast<double>(i) + 1), INSERT_VALUES));
-  check(VecAssemblyBegin(x));
-  check(VecAssemblyEnd(x));
+  finish(x);
   return x;
 }
 

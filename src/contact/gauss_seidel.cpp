@@ -43,13 +43,6 @@ template <class Entry> struct SweptProblem
   std::vector<PastSweep<Entry>> differences{};                     // of sweeps in succession
   int swept = 0;                                                   // since the last product with W
   int failures = 0; // products with W in succession that did not halve the residual after finished sweeps
-
-  /// work(pair) of all of this rank's.
-  template <class Visit> void for_each_own(Visit visit) const
-  {
-    for (const Turn& turn : turns)
-      for (const std::size_t pair : turn.own()) visit(pair);
-  }
 };
 
 template <class Entry> PairVector velocity_of(const SweptProblem<Entry>& problem, std::size_t pair)
@@ -119,10 +112,9 @@ template <class Entry> Swept agree(const SweptProblem<Entry>& problem, bool move
 {
   const Scales largest = largest_reactions(problem.work);
   Swept swept{0, moved ? 1. : 0.};
-  problem.for_each_own(
-      [&](std::size_t pair) {
-        swept.residual = std::max(swept.residual, defect_of(problem.work, pair, velocity_of(problem, pair), largest));
-      });
+  for (const Turn& turn : problem.turns)
+    for (const std::size_t pair : turn.own())
+      swept.residual = std::max(swept.residual, defect_of(problem.work, pair, velocity_of(problem, pair), largest));
   if (problem.comm != MPI_COMM_NULL) MPI_Allreduce(MPI_IN_PLACE, &swept, 2, MPI_DOUBLE, MPI_MAX, problem.comm);
   return swept;
 }
@@ -276,21 +268,16 @@ template <class Entry> void sweep_until_converged(SweptProblem<Entry> problem, c
   }
 }
 
-/// Reactions that sweeps began with, and W times them.
-struct SweepStart
-{
-  std::vector<double> r, Wr;
-};
-
-/// Where slices swept side by side led away from the law, the next sweeps begin where these did.
-void begin_as_one(ContactWork& work, const SweepStart& start)
+/// Where slices swept side by side led away from the law, the next sweeps begin where these did: at r, and W times it.
+void begin_as_one(ContactWork& work, std::vector<double> r, std::vector<double> Wr)
 {
   work.result.as_one = true;
   const double reached = residual_of(work);
-  SweepStart end{std::exchange(work.r, start.r), std::exchange(work.Wr, start.Wr)};
-  if (!(reached < residual_of(work))) return;
-  work.r = std::move(end.r);
-  work.Wr = std::move(end.Wr);
+  for (int times = 0; times < 2 && (times == 0 || reached < residual_of(work)); ++times)
+  {
+    work.r.swap(r);
+    work.Wr.swap(Wr);
+  }
 }
 
 /// Sweeps over W itself, on rank 0.
@@ -316,11 +303,11 @@ void gauss_seidel(ContactWork& work, const ContactSettings& settings)
   if (W.has_near_field())
   {
     const bool several = W.in_sequence().size() > 1;
-    const SweepStart start{work.r, work.Wr};
+    const std::vector<double> r = work.r, Wr = work.Wr;
     sweep_until_converged<float>({work, W.side_by_side(), W.shared_by(), several}, settings);
     if (several && is_open())
     {
-      begin_as_one(work, start);
+      begin_as_one(work, r, Wr);
       sweep_until_converged<float>({work, W.in_sequence(), W.shared_by()}, settings);
     }
   }

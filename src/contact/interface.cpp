@@ -45,34 +45,10 @@ std::vector<Vec3> tangent_axes(const Contact& contact, const Vec3& normal, const
   return axes;
 }
 
-std::string where(const Interface& interface, int pair)
-{
-  std::string text = "pair " + std::to_string(pair);
-  if (interface.geometry.empty()) return text;
-  const Vec3& at = interface.geometry[static_cast<std::size_t>(pair)].position;
-  return text + " at (" + std::to_string(at[0]) + ", " + std::to_string(at[1]) + ", " + std::to_string(at[2]) + ")";
-}
-
-/// Whether none of the files of contact pairs is there.
-bool has_no_pairs(const std::filesystem::path& folder, MPI_Comm comm)
-{
-  int found = 0;
-  on_rank_zero(comm,
-               [&]
-               {
-                 for (const char* name : {"B.petsc", "gap.petsc", "drive.petsc"}) found += is_file(folder / name);
-               });
-  MPI_Bcast(&found, 1, MPI_INT, 0, comm);
-  return found == 0;
-}
-
 /// Of a file that need not be there.
 void read_compliance(const std::filesystem::path& file, Interface& interface, MPI_Comm comm)
 {
-  int found = 0;
-  on_rank_zero(comm, [&] { found = is_file(file) ? 1 : 0; });
-  MPI_Bcast(&found, 1, MPI_INT, 0, comm);
-  if (!found) return;
+  if (!is_there(file, comm)) return;
   interface.compliance = read_vector(file, comm);
   if (interface.compliance.size() != interface.gap.size())
     throw Error(file.string() + ": length " + std::to_string(interface.compliance.size()) + " for the " +
@@ -103,11 +79,19 @@ void check_interface(const Interface& interface, const std::string& source, MPI_
                {
                  if (!rows.is_normal(row) || !problem.empty()) return;
                  if (std::all_of(values.begin(), values.end(), is_zero))
-                   problem = source + ": " + where(interface, static_cast<int>(rows.pair_of(row))) +
+                   problem = source + ": " + place_of_pair(interface, static_cast<std::size_t>(rows.pair_of(row))) +
                              " cannot move along its normal: both sides are held still there, remove it from the "
                              "contact";
                });
   agree(comm, problem);
+}
+
+std::string place_of_pair(const Interface& interface, std::size_t pair)
+{
+  if (interface.geometry.empty()) return format("pair %zu", pair);
+  const ContactPair& at = interface.geometry[pair];
+  return format("pair %zu of contact %d at (%g, %g, %g)", pair, at.contact, at.position[0], at.position[1],
+                at.position[2]);
 }
 
 Interface sharing(const Interface& of)
@@ -191,7 +175,8 @@ Interface read_interface(const std::filesystem::path& folder, const Structure& s
 {
   Interface interface;
   interface.friction = friction;
-  if (has_no_pairs(folder, comm))
+  if (!is_there(folder / "B.petsc", comm) && !is_there(folder / "gap.petsc", comm) &&
+      !is_there(folder / "drive.petsc", comm))
   {
     interface.B = matrix_of_rows({}, own_rows(structure.M).size(), comm);
     return interface;
@@ -355,19 +340,14 @@ std::vector<double> drive_friction(const Interface& interface)
 Owned<Mat> rows_of(const Interface& interface, const std::vector<int>& pairs, RowsTaken taken)
 {
   const PairRows<PetscInt> rows_of_pairs(interface.directions);
-  const IndexRange own = own_rows(interface.B), dofs = own_columns(interface.B);
+  const IndexRange own = own_rows(interface.B);
   const PetscInt count = taken == RowsTaken::all ? rows_of_pairs.per_pair() : 1;
   std::vector<PetscInt> mine;
   for (const int pair : pairs)
     for (PetscInt k = 0; k < count; ++k)
       if (const PetscInt row = rows_of_pairs.normal(pair) + k; own.holds(row)) mine.push_back(row);
   const MPI_Comm comm = comm_of(interface.B);
-  Owned<IS> rows, columns;
-  check(ISCreateGeneral(comm, static_cast<PetscInt>(mine.size()), mine.data(), PETSC_COPY_VALUES, rows.put()));
-  check(ISCreateStride(comm, dofs.size(), dofs.first, 1, columns.put()));
-  Owned<Mat> result;
-  check(MatCreateSubMatrix(interface.B, rows, columns, MAT_INITIAL_MATRIX, result.put()));
-  return result;
+  return part_of(interface.B, set_of(comm, mine), set_of(comm, own_columns(interface.B)));
 }
 
 } // namespace squeal

@@ -120,14 +120,4 @@ ContactResult solve_contact(const ContactOperator& W, const PairFriction& fricti
   return work.result;
 }
 
-double contact_residual(const ContactOperator& W, const PairFriction& friction, const std::vector<double>& b,
-                        const std::vector<double>& r)
-{
-  std::vector<double> reactions = r;
-  ContactMemory nothing;
-  ContactWork work = start(W, friction, {b, reactions, nothing});
-  form_product(work);
-  return residual_of(work);
-}
-
 } // namespace squeal

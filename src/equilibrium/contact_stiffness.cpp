@@ -47,9 +47,7 @@ Owned<Mat> stiffness_of_pairs(const Interface& interface, const std::vector<char
 
 Owned<Mat> contact_stiffness(const Interface& interface, const std::vector<char>& closed, PairForces part)
 {
-  const Owned<Mat> stiffness = stiffness_of_pairs(interface, closed, part);
-  if (!stiffness.get()) return {};
-  return project(stiffness, interface.B, interface.B);
+  return project(stiffness_of_pairs(interface, closed, part), interface.B, interface.B);
 }
 
 Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>& closed,
@@ -72,9 +70,7 @@ Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>&
 Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>& closed,
                             const std::vector<double>& reactions, FrictionDamping part)
 {
-  const Owned<Mat> damping = damping_of_pairs(interface, closed, reactions, part);
-  if (!damping.get()) return {};
-  return project(damping, interface.B, interface.B);
+  return project(damping_of_pairs(interface, closed, reactions, part), interface.B, interface.B);
 }
 
 } // namespace squeal

@@ -8,17 +8,6 @@
 namespace squeal
 {
 
-namespace
-{
-
-/// What nothing touches and nothing loads stays where it is, held or free: the modes of a free body need no support.
-bool stays_at_rest(const Structure& structure, const Interface& interface)
-{
-  return interface.pairs == 0 && norm_of(structure.load, NORM_INFINITY) == 0;
-}
-
-} // namespace
-
 Equilibria::Equilibria(const EquilibriumOptions& options) : options_(options) {}
 
 Equilibria::~Equilibria() = default;
@@ -26,7 +15,8 @@ Equilibria::~Equilibria() = default;
 Equilibrium Equilibria::at(const Structure& structure, const Interface& interface)
 {
   Equilibrium equilibrium;
-  if (stays_at_rest(structure, interface))
+  // what nothing touches and nothing loads stays where it is, held or free: the modes of a free body need no support
+  if (interface.pairs == 0 && norm_of(structure.load, NORM_INFINITY) == 0)
   {
     equilibrium.u = zeros_like(structure.load);
     equilibrium.directions = interface.directions;

@@ -283,6 +283,7 @@ Owned<Mat> project_symmetric(Mat A, Mat Z)
 
 Owned<Mat> project(Mat A, Mat Y, Mat Z)
 {
+  if (!A) return {};
   // among ranks PETSc's own choices take three times as long
   const auto multiply = [](Mat L, Mat R, MatProductType type, MatProductAlgorithm among_ranks)
   {

@@ -103,38 +103,20 @@ StickSlipFriction friction_of(const PathOperators& operators, const Interface& i
   return friction;
 }
 
-/// The compliance of the rows to each other's forces, without friction, and with that of driven pairs.
-struct Compliance
-{
-  MatrixXd own, with_friction;
-};
-
-Compliance compliance_of(const PathOperators& operators, const Interface& interface)
-{
-  const PairRows<Index> rows(interface.directions);
-  const MatrixXd& D = operators.D;
-  if (!operators.driven) return {D, D};
-  const std::vector<double> directions = drive_directions(interface), mu = drive_friction(interface);
-  const Index pairs = interface.pairs;
-  MatrixXd M = D(Eigen::all, Eigen::seqN(0, pairs, rows.per_pair()));
-  Compliance result{M, {}};
-  for (Index pair = 0; pair < pairs; ++pair)
-    for (Index k = 0; k < rows.directions; ++k)
-    {
-      const auto i = static_cast<std::size_t>(pair);
-      const double e = TangentView(directions, interface.directions).of(i)[static_cast<std::size_t>(k)];
-      M.col(pair) += mu[i] * e * D.col(rows.tangential(pair) + k);
-    }
-  result.with_friction = std::move(M);
-  return result;
-}
-
-/// N = 1 - kappa D and M with friction, to which compliances c in series with the rows add: the unknown motions are
-/// w + c r.
+/// N = 1 - kappa D and M with the friction of driven pairs, to which compliances c in series with the rows add: the
+/// unknown motions are w + c r.
 StickSlipOperator operator_of(const PathOperators& operators, const Interface& interface)
 {
-  auto [N, M] = compliance_of(operators, interface);
+  const MatrixXd& D = operators.D;
+  const Index per_unknown = operators.driven ? PairRows<Index>(interface.directions).per_pair() : 1;
+  MatrixXd N = D(Eigen::all, Eigen::seqN(0, D.rows(), per_unknown)), M = N;
   VectorXd own = N.diagonal();
+  if (operators.driven)
+  {
+    const VectorXd forces = as_vector(with_friction(operators, interface, std::vector(interface.gap.size(), 1.)));
+    for (Index pair = 0; pair < M.cols(); ++pair)
+      M.col(pair) = D.middleCols(pair * per_unknown, per_unknown) * forces.segment(pair * per_unknown, per_unknown);
+  }
   N *= -operators.held.kappa;
   N.diagonal().array() += 1;
   N = (N.array().abs() < 1e-13).select(0, N); // rounding of 1 - 1: the pair alone holds its body
@@ -165,14 +147,6 @@ std::vector<double> as_list(const VectorXd& x)
   return {x.data(), x.data() + x.size()};
 }
 
-std::string place_of(const Interface& interface, std::size_t pair)
-{
-  if (interface.geometry.empty()) return format("pair %zu", pair);
-  const ContactPair& at = interface.geometry[pair];
-  return format("pair %zu of contact %d at (%g, %g, %g)", pair, at.contact, at.position[0], at.position[1],
-                at.position[2]);
-}
-
 std::size_t pair_that_moves_most(const Interface& interface, const VectorXd& motion)
 {
   Index row = 0;
@@ -191,14 +165,14 @@ std::string mechanism(const PathProblem& problem, const PathWalk& walk, const In
     for (std::size_t i = 0; i < statuses.size(); ++i)
       slipping += statuses[i] == ContactStatus::slip && is_undriven(interface, i);
     text += format("; %zu undriven pairs slip there, and %s moves most", slipping,
-                   place_of(interface, pair_that_moves_most(interface, walk.state.w)).c_str());
+                   place_of_pair(interface, pair_that_moves_most(interface, walk.state.w)).c_str());
   }
   const auto motion = unresisted_motion(problem, problem.friction, problem.ends.back().q);
   if (!motion) return text;
   return text +
          "; it is proved that no forces within friction balance the load: nothing resists a rigid motion that is "
          "largest at " +
-         place_of(interface, pair_that_moves_most(interface, *motion));
+         place_of_pair(interface, pair_that_moves_most(interface, *motion));
 }
 
 /// The end of the walk. All but `found` is rank 0's.

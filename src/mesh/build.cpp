@@ -30,14 +30,6 @@ bool is_inside_out(const Element& element, const Mesh& mesh)
   return J.determinant() < 0;
 }
 
-/// Reverses the orientation of an element.
-void mirror(Element& element)
-{
-  const auto before = element.nodes;
-  const std::vector<int> order = mirrored_order(element.shape);
-  for (std::size_t i = 0; i < order.size(); ++i) element.nodes[i] = before[order[i]];
-}
-
 /// Index of the part whose name is one of the block's groups; -1 if there is none.
 int part_of(const ElementBlock& block, const Scene& scene)
 {

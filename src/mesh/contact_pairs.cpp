@@ -45,9 +45,9 @@ HeldMotions held_motions(const Mesh& mesh, const Scene& scene)
   for (const Support& support : scene.supports)
     for (const int node : named_nodes(mesh, support.on, "support"))
     {
-      const Eigen::Matrix3d axes = axes_at(support.frame, mesh.nodes[node], "support on " + support.on);
-      for (int c = 0; c < 3; ++c)
-        if (support.fixed[static_cast<std::size_t>(c)]) hold(held[node], {axes(0, c), axes(1, c), axes(2, c)});
+      const std::array<Vec3, 3> axes = axes_at(support.frame, mesh.nodes[node], "support on " + support.on);
+      for (std::size_t c = 0; c < 3; ++c)
+        if (support.fixed[c]) hold(held[node], axes[c]);
     }
   for (const RigidBody& body : scene.rigid_bodies)
     for (const std::string& surface : body.surfaces)

@@ -8,6 +8,8 @@
 #include <boost/geometry/index/rtree.hpp>
 #include <cmath>
 #include <map>
+#include <ranges>
+#include <set>
 
 namespace squeal
 {
@@ -26,11 +28,9 @@ Vec3 vec3(const Eigen::Vector3d& v)
 
 std::vector<int> nodes_of_faces(const std::vector<Face>& faces)
 {
-  std::vector<int> nodes;
-  for (const Face& face : faces) nodes.insert(nodes.end(), nodes_of(face).begin(), nodes_of(face).end());
-  std::sort(nodes.begin(), nodes.end());
-  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-  return nodes;
+  std::set<int> nodes;
+  for (const Face& face : faces) nodes.insert(nodes_of(face).begin(), nodes_of(face).end());
+  return {nodes.begin(), nodes.end()};
 }
 
 /// int chi_i n dA of each node of a face [m2].
@@ -311,28 +311,25 @@ std::string share_text(const ContactSurface& a, const ContactSurface& b)
 std::vector<std::size_t> hand_over(const ContactSurface& slave, const std::vector<Vec3>& x,
                                    const std::vector<RowFate>& fate, SlaveRows& rows)
 {
-  std::vector<std::vector<std::size_t>> takers(slave.nodes.size());
+  std::vector<std::set<std::size_t>> takers(slave.nodes.size());
   for (std::size_t f = 0; f < slave.faces.size(); ++f)
     for (const int giver : nodes_of(slave.faces[f]))
       if (const std::size_t d = slave.place_of(giver); rows.covered[f] && fate[d] == RowFate::given_up)
         for (const int taker : nodes_of(slave.faces[f]))
           if (const std::size_t k = slave.place_of(taker); fate[k] == RowFate::kept && rows.rows[k].is_covered())
-            takers[d].push_back(k);
+            takers[d].insert(k);
   std::vector<std::size_t> alone;
   for (std::size_t d = 0; d < takers.size(); ++d)
   {
     if (fate[d] != RowFate::given_up || !rows.rows[d].is_covered()) continue;
-    std::vector<std::size_t>& near = takers[d];
+    std::set<std::size_t>& near = takers[d];
     if (near.empty())
     {
       alone.push_back(d);
       continue;
     }
-    std::sort(near.begin(), near.end());
-    near.erase(std::unique(near.begin(), near.end()), near.end());
     const auto distance = [&](std::size_t k) { return norm(x[slave.nodes[k]] - x[slave.nodes[d]]); };
-    double least = distance(near.front());
-    for (const std::size_t k : near) least = std::min(least, distance(k));
+    const double least = std::ranges::min(near | std::views::transform(distance));
     std::erase_if(near, [&](std::size_t k) { return distance(k) > 1.01 * least; });
     const double share = 1 / static_cast<double>(near.size());
     const SlaveRow& given = rows.rows[d];

@@ -125,10 +125,19 @@ SlaveInPlane in_plane(const PlacedFace& face, const Eigen::Vector3d& along)
   return slave;
 }
 
-/// The point of a triangle with these barycentric coordinates.
-PlanePoint point_of(const Polygon& triangle, const NodeValues& weights)
+/// Calls visit(point, weight [m2], slave's functions) at the Gauss points of the triangles of a polygon.
+template <class Visit> void for_each_point(const SlaveInPlane& slave, const Polygon& polygon, Visit visit)
 {
-  return weights(0) * triangle[0] + weights(1) * triangle[1] + weights(2) * triangle[2];
+  for (std::size_t k = 1; k + 1 < polygon.size(); ++k)
+  {
+    const Polygon triangle{polygon[0], polygon[k], polygon[k + 1]};
+    const double jacobian = slave.stretch * twice_area(triangle);
+    for (const auto& [xi, weight, corner] : triangle_rule())
+    {
+      const PlanePoint point = corner.N(0) * triangle[0] + corner.N(1) * triangle[1] + corner.N(2) * triangle[2];
+      visit(point, weight * jacobian, functions_at(slave.face.shape, slave.x, point, slave.size).N);
+    }
+  }
 }
 
 /// Integrals over one overlap.
@@ -144,41 +153,27 @@ Overlap integrate(const SlaveInPlane& slave, const PlacedFace& master, const Nod
 {
   const auto ns = slave.x.cols(), nm = x.cols();
   Overlap overlap{FaceValues::Zero(ns), FaceMatrix::Zero(ns, ns), FaceMatrix::Zero(ns, nm), 1e300, 1e300, {}};
-  for (std::size_t k = 1; k + 1 < polygon.size(); ++k)
+  const auto add = [&](const PlanePoint& point, double w, const FaceValues& phi)
   {
-    const Polygon triangle{polygon[0], polygon[k], polygon[k + 1]};
-    const double jacobian = slave.stretch * twice_area(triangle);
-    for (const auto& [xi, weight, corner] : triangle_rule())
-    {
-      const PlanePoint point = point_of(triangle, corner.N);
-      const FaceValues phi = functions_at(slave.face.shape, slave.x, point, slave.size).N;
-      const FaceValues N = functions_at(master.shape, x, point, slave.size).N;
-      const FaceValues chi = multiplier_factors(slave.face.shape) * phi;
-      const double gap = x.row(2).dot(N.transpose()) - slave.x.row(2).dot(phi.transpose()), w = weight * jacobian;
-      overlap.area += w * chi;
-      overlap.gram += w * chi * chi.transpose();
-      overlap.coupling += w * chi * N.transpose();
-      if (std::abs(gap) < std::abs(overlap.nearest_gap)) overlap.nearest_gap = gap;
-      if (gap < overlap.least_gap) overlap.least_gap = gap, overlap.at = point;
-    }
-  }
+    const FaceValues N = functions_at(master.shape, x, point, slave.size).N;
+    const FaceValues chi = multiplier_factors(slave.face.shape) * phi;
+    const double gap = x.row(2).dot(N.transpose()) - slave.x.row(2).dot(phi.transpose());
+    overlap.area += w * chi;
+    overlap.gram += w * chi * chi.transpose();
+    overlap.coupling += w * chi * N.transpose();
+    if (std::abs(gap) < std::abs(overlap.nearest_gap)) overlap.nearest_gap = gap;
+    if (gap < overlap.least_gap) overlap.least_gap = gap, overlap.at = point;
+  };
+  for_each_point(slave, polygon, add);
   return overlap;
 }
 
 /// int chi over the polygon of the slave's corners.
 FaceValues whole_area(const SlaveInPlane& slave)
 {
-  FaceValues phi = FaceValues::Zero(slave.x.cols());
-  for (std::size_t k = 1; k + 1 < slave.corners.size(); ++k)
-  {
-    const Polygon triangle{slave.corners[0], slave.corners[k], slave.corners[k + 1]};
-    for (const auto& [xi, weight, corner] : triangle_rule())
-    {
-      const PlanePoint point = point_of(triangle, corner.N);
-      phi += weight * twice_area(triangle) * functions_at(slave.face.shape, slave.x, point, slave.size).N;
-    }
-  }
-  return slave.stretch * multiplier_factors(slave.face.shape) * phi;
+  FaceValues sum = FaceValues::Zero(slave.x.cols());
+  for_each_point(slave, slave.corners, [&](const PlanePoint&, double w, const FaceValues& phi) { sum += w * phi; });
+  return multiplier_factors(slave.face.shape) * sum;
 }
 
 Vec3 place_of(const SlaveInPlane& slave, const PlanePoint& at)

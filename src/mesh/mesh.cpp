@@ -276,7 +276,7 @@ std::vector<int> rotors_of_contacts(const Scene& scene, const Mesh& mesh)
   return rotors;
 }
 
-Eigen::Matrix3d axes_at(const Frame& frame, const Vec3& place, const std::string& user)
+std::array<Vec3, 3> axes_at(const Frame& frame, const Vec3& place, const std::string& user)
 {
   Vec3 first = frame.axis_1, second = frame.axis_2;
   if (frame.cylinder)
@@ -291,22 +291,7 @@ Eigen::Matrix3d axes_at(const Frame& frame, const Vec3& place, const std::string
     first = (1 / norm(radius)) * radius;
     second = cross(axis, first);
   }
-  const Vec3 third = cross(first, second);
-  Eigen::Matrix3d axes;
-  for (int c = 0; c < 3; ++c)
-  {
-    const auto i = static_cast<std::size_t>(c);
-    axes.row(c) << first[i], second[i], third[i];
-  }
-  return axes;
-}
-
-Eigen::Matrix<double, 6, 6> twice(const Eigen::Matrix3d& axes)
-{
-  Eigen::Matrix<double, 6, 6> both = Eigen::Matrix<double, 6, 6>::Zero();
-  both.topLeftCorner<3, 3>() = axes;
-  both.bottomRightCorner<3, 3>() = axes;
-  return both;
+  return {first, second, cross(first, second)};
 }
 
 } // namespace squeal

@@ -83,6 +83,14 @@ const Topology& topology(Shape shape)
   return topologies.at(static_cast<std::size_t>(shape));
 }
 
+/// of(shape) of each, in the order of Shape.
+template <class Of> auto of_all_shapes(Of of)
+{
+  std::vector<decltype(of(Shape{}))> result;
+  for (std::size_t i = 0; i < topologies.size(); ++i) result.push_back(of(static_cast<Shape>(i)));
+  return result;
+}
+
 /// Whether the functions of a shape have a product of these powers.
 bool has_product(const Topology& t, const Place& powers)
 {
@@ -191,22 +199,20 @@ std::span<const std::array<int, 4>> corner_faces(Shape shape)
 
 const std::vector<std::vector<int>>& middles_of(Shape shape)
 {
-  static const auto all = []
+  const auto of = [](Shape each)
   {
-    std::array<std::vector<std::vector<int>>, topologies.size()> result;
-    for (std::size_t i = 0; const Topology& t : topologies)
-    {
-      std::vector<std::vector<int>>& middles = result[i++];
-      for (const auto& [a, b] : t.mid_sides) middles.push_back({a, b});
-      if (!t.is_full) continue;
-      for (const CornerFace& face : t.faces)
-        if (face[3] >= 0) middles.emplace_back(face.begin(), face.end());
-      if (t.corners.data() != box) continue;
-      middles.emplace_back(t.corners.size());
-      std::iota(middles.back().begin(), middles.back().end(), 0);
-    }
-    return result;
-  }();
+    const Topology& t = topology(each);
+    std::vector<std::vector<int>> middles;
+    for (const auto& [a, b] : t.mid_sides) middles.push_back({a, b});
+    if (!t.is_full) return middles;
+    for (const CornerFace& face : t.faces)
+      if (face[3] >= 0) middles.emplace_back(face.begin(), face.end());
+    if (t.corners.data() != box) return middles;
+    middles.emplace_back(t.corners.size());
+    std::iota(middles.back().begin(), middles.back().end(), 0);
+    return middles;
+  };
+  static const auto all = of_all_shapes(of);
   return all[static_cast<std::size_t>(shape)];
 }
 
@@ -242,13 +248,13 @@ Face face_on(const Element& element, std::span<const int> corners)
   return face;
 }
 
-std::vector<int> mirrored_order(Shape shape)
+void mirror(Element& element)
 {
-  const std::vector<Eigen::Vector3d> nodes = natural_positions(shape);
-  std::vector<int> order;
-  for (const Eigen::Vector3d& xi : nodes)
-    order.push_back(static_cast<int>(std::ranges::find(nodes, Eigen::Vector3d(xi(1), xi(0), xi(2))) - nodes.begin()));
-  return order;
+  const std::vector<Eigen::Vector3d> places = natural_positions(element.shape);
+  const auto before = element.nodes;
+  for (std::size_t i = 0; i < places.size(); ++i)
+    element.nodes[i] =
+        before[std::ranges::find(places, Eigen::Vector3d(places[i](1), places[i](0), places[i](2))) - places.begin()];
 }
 
 void add_middles(Shape shape, std::vector<Eigen::Vector3d>& corners)
@@ -279,12 +285,7 @@ Eigen::Vector3d middle_of(Shape shape)
 
 ShapeFunctions shape_functions(Shape shape, const Eigen::Vector3d& xi)
 {
-  static const std::vector<Polynomials> all = []
-  {
-    std::vector<Polynomials> result;
-    for (std::size_t i = 0; i < topologies.size(); ++i) result.push_back(polynomials_of(static_cast<Shape>(i)));
-    return result;
-  }();
+  static const std::vector<Polynomials> all = of_all_shapes(polynomials_of);
   const auto& [products, factors] = all[static_cast<std::size_t>(shape)];
   BoundedMatrix<4, most_nodes> values(4, factors.rows()); // rows: the product and its derivatives
   for (Eigen::Index i = 0; i < values.cols(); ++i)

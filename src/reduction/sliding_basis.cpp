@@ -65,13 +65,6 @@ void set_contact(SlidingBasis& basis, Mat B)
   for (BasisImage* image : {&basis.M, &basis.C, &basis.K, &basis.K_loss, &basis.G, &basis.H}) image->matrix = {};
 }
 
-Owned<IS> set_of(MPI_Comm comm, const std::vector<PetscInt>& places)
-{
-  Owned<IS> set;
-  check(ISCreateGeneral(comm, static_cast<PetscInt>(places.size()), places.data(), PETSC_COPY_VALUES, set.put()));
-  return set;
-}
-
 /// The pivots of this rank.
 Owned<IS> pivot_set(const ClosedContact& contact)
 {
@@ -79,20 +72,6 @@ Owned<IS> pivot_set(const ClosedContact& contact)
   for (const Index pivot : local_pivots(contact))
     own.push_back(own_rows(contact.Z).first + static_cast<PetscInt>(pivot));
   return set_of(comm_of(contact.Z), own);
-}
-
-Owned<IS> set_of(MPI_Comm comm, const IndexRange& range)
-{
-  Owned<IS> set;
-  check(ISCreateStride(comm, range.size(), range.first, 1, set.put()));
-  return set;
-}
-
-Owned<Mat> part_of(Mat A, IS rows, IS columns)
-{
-  Owned<Mat> result;
-  check(MatCreateSubMatrix(A, rows, columns, MAT_INITIAL_MATRIX, result.put()));
-  return result;
 }
 
 /// Both lifts of a point.

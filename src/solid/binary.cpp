@@ -137,6 +137,14 @@ std::string problem_of_entries(Mat A, const std::filesystem::path& file)
 
 } // namespace
 
+bool is_there(const std::filesystem::path& file, MPI_Comm comm)
+{
+  int found = 0;
+  on_rank_zero(comm, [&] { found = is_file(file) ? 1 : 0; });
+  MPI_Bcast(&found, 1, MPI_INT, 0, comm);
+  return found != 0;
+}
+
 MatrixSize check_matrix_file(const std::filesystem::path& file, MPI_Comm comm)
 {
   MatrixSize size;
@@ -285,8 +293,7 @@ void add_forces(const MatrixRows& rows, const std::vector<Force>& forces, Vec lo
         check(VecSetValue(load, row, force.vector[c] / static_cast<double>(pushed.size()), ADD_VALUES));
     }
   }
-  check(VecAssemblyBegin(load));
-  check(VecAssemblyEnd(load));
+  finish(load);
 }
 
 std::vector<PetscInt> held_rows(const MatrixRows& rows, const std::vector<Support>& supports)
@@ -336,27 +343,17 @@ Elimination::Elimination(const std::vector<PetscInt>& held, Vec layout)
   std::vector<PetscInt> kept;
   for (PetscInt row = first; row < last; ++row)
     if (!std::binary_search(held.begin(), held.end(), row)) kept.push_back(row);
-  check(ISCreateGeneral(comm_of(layout), static_cast<PetscInt>(kept.size()), kept.data(), PETSC_COPY_VALUES,
-                        kept_.put()));
+  kept_ = set_of(comm_of(layout), kept);
 }
 
 Owned<Mat> Elimination::square(Mat A) const
 {
-  if (!A) return {};
-  Owned<Mat> result;
-  check(MatCreateSubMatrix(A, kept_, kept_, MAT_INITIAL_MATRIX, result.put()));
-  return result;
+  return A ? part_of(A, kept_, kept_) : Owned<Mat>();
 }
 
 Owned<Mat> Elimination::columns(Mat A) const
 {
-  if (!A) return {};
-  const IndexRange own = own_rows(A);
-  Owned<IS> rows;
-  check(ISCreateStride(comm_of(A), own.size(), own.first, 1, rows.put()));
-  Owned<Mat> result;
-  check(MatCreateSubMatrix(A, rows, kept_, MAT_INITIAL_MATRIX, result.put()));
-  return result;
+  return A ? part_of(A, set_of(comm_of(A), own_rows(A)), kept_) : Owned<Mat>();
 }
 
 Owned<Vec> Elimination::entries(Vec x) const

@@ -1,6 +1,7 @@
 #include "constraints.hpp"
 
 #include "squeal/mesh/frames.hpp"
+#include "squeal/mesh/shape_functions.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -76,16 +77,18 @@ std::vector<Weighted> weighted_nodes(const Coupling& coupling, const Mesh& mesh)
 void hold_node(Constraints& constraints, const Mesh& mesh, const Support& support, int node)
 {
   const std::string user = "support on " + support.on;
-  const Eigen::Matrix3d axes = axes_at(support.frame, mesh.nodes[node], user);
+  const std::array<Vec3, 3> axes = axes_at(support.frame, mesh.nodes[node], user);
   for (int motion = 0; motion < 6; ++motion)
   {
     const auto i = static_cast<std::size_t>(motion);
     if (!support.fixed[i]) continue;
     const int first = motion < 3 ? 0 : 3;
+    const Vec3& axis = axes[i % 3];
     ConstraintRow row{{}, motion < 3 ? support.displacement[i] : support.rotation[i - 3]};
     for (int c = 0; c < 3; ++c)
-      if (constraints.kind_of(node, first + c) != DofKind::absent && axes(c, motion - first) != 0)
-        row.terms.push_back({6 * PetscInt{node} + first + c, axes(c, motion - first)});
+      if (const double part = axis[static_cast<std::size_t>(c)];
+          constraints.kind_of(node, first + c) != DofKind::absent && part != 0)
+        row.terms.push_back({6 * PetscInt{node} + first + c, part});
     if (row.terms.empty()) continue;
     add_row(constraints, row, user + ": " + node_text(node, mesh.nodes[node]) + ", " + motion_words[i]);
   }
@@ -179,7 +182,9 @@ RelativeMotion relative_motion(const Connector& connector, const Mesh& mesh)
     block.topRightCorner<3, 3>() =
         -sign * cross_matrix(as_eigen(at - mesh.nodes[result.nodes[static_cast<std::size_t>(i)]]));
   }
-  result.rows = (twice(axes_at(connector.frame, at, label_of(connector))).transpose() * result.rows).eval();
+  const NodePositions axes = position_matrix(axes_at(connector.frame, at, label_of(connector)));
+  for (const int first : {0, 3})
+    result.rows.middleRows<3>(first) = (axes.transpose() * result.rows.middleRows<3>(first)).eval();
   return result;
 }
 

@@ -27,7 +27,6 @@ struct Constraints
   std::vector<DofKind> kind; // of each nodal degree of freedom
   std::unordered_map<PetscInt, std::vector<ConstraintTerm>> dependent;
   std::unordered_map<PetscInt, double> shift; // [m, rad] that a fixed or dependent one has beside its terms; else none
-  std::unordered_map<int, int> body_of;       // rigid body of a node on its surfaces
 
   DofKind& kind_of(int node, int component) { return kind[6 * PetscInt{node} + component]; }
 };

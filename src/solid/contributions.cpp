@@ -17,22 +17,16 @@ namespace squeal
 namespace
 {
 
-/// `inertia` is xx yy zz xy yz zx [kg m2].
-Contribution mass_contribution(int node, double mass, const std::array<double, 6>& inertia)
-{
-  const auto& [xx, yy, zz, xy, yz, zx] = inertia;
-  Contribution result{nodal_dofs_of(std::span(&node, 1), 6), Eigen::MatrixXd::Zero(6, 6), Eigen::MatrixXd::Zero(6, 6),
-                      Eigen::MatrixXd::Zero(6, 6)};
-  result.M.diagonal().head<3>().setConstant(mass);
-  result.M.bottomRightCorner<3, 3>() << xx, xy, zx, xy, yy, yz, zx, yz, zz;
-  return result;
-}
-
-/// Adds the mass of a reference point.
+/// Adds the mass of a reference point; `inertia` is xx yy zz xy yz zx [kg m2].
 void add_mass(const Mesh& mesh, const std::string& name, double mass, const std::array<double, 6>& inertia,
               std::vector<Contribution>& result)
 {
-  result.push_back(mass_contribution(point_node(mesh, name, "mass"), mass, inertia));
+  const auto& [xx, yy, zz, xy, yz, zx] = inertia;
+  const int node = point_node(mesh, name, "mass");
+  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(6, 6);
+  M.diagonal().head<3>().setConstant(mass);
+  M.bottomRightCorner<3, 3>() << xx, xy, zx, xy, yy, yz, zx, yz, zz;
+  result.push_back({nodal_dofs_of(std::span(&node, 1), 6), M, 0 * M, 0 * M});
 }
 
 /// The elongation d . (u_to - u_from) of a spring gives K = k s s', with s the elongations of unit displacements. The
@@ -141,12 +135,9 @@ Material material_at(const Part& part, const std::vector<Vec3>& x)
   Orthotropy& o = *material.orthotropy;
   Vec3 middle{};
   for (const Vec3& node : x) middle = middle + 1. / static_cast<double>(x.size()) * node;
-  const Eigen::Matrix3d axes = axes_at({o.axis_1, o.axis_2, o.cylinder}, middle, "part " + part.name);
-  for (Eigen::Index c = 0; c < 3; ++c)
-  {
-    o.axis_1[static_cast<std::size_t>(c)] = axes(c, 0);
-    o.axis_2[static_cast<std::size_t>(c)] = axes(c, 1);
-  }
+  const std::array<Vec3, 3> axes = axes_at({o.axis_1, o.axis_2, o.cylinder}, middle, "part " + part.name);
+  o.axis_1 = axes[0];
+  o.axis_2 = axes[1];
   return material;
 }
 
@@ -280,18 +271,6 @@ void add_vector(Vec vector, const LocalDofs& local, const Eigen::VectorXd& f)
   for (const LocalTerm& t : local.terms)
     if (const PetscInt row = local.rows[static_cast<std::size_t>(t.free)]; row >= 0)
       check(VecSetValue(vector, row, t.factor * f(t.nodal), ADD_VALUES));
-}
-
-void finish(Mat A)
-{
-  check(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
-  check(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
-}
-
-void finish(Vec x)
-{
-  check(VecAssemblyBegin(x));
-  check(VecAssemblyEnd(x));
 }
 
 } // namespace squeal

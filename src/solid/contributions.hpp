@@ -94,8 +94,4 @@ std::vector<Cut> cuts_of(const Bolt& bolt, const NumberedMesh& numbered, const S
 /// about its axis.
 void add_spin(Structure& structure, const NumberedMesh& numbered, const Scene& scene);
 
-/// Ends the assembly of a matrix, or of a vector. Collective.
-void finish(Mat A);
-void finish(Vec x);
-
 } // namespace squeal

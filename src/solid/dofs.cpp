@@ -18,6 +18,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <set>
 
 namespace squeal
 {
@@ -81,6 +82,7 @@ void attach_node(Constraints& constraints, const Mesh& mesh, int node, int refer
 
 void add_rigid_bodies(Constraints& constraints, const Mesh& mesh, const std::vector<RigidBody>& bodies)
 {
+  std::map<int, std::size_t> body_of; // of a node
   for (std::size_t i = 0; i < bodies.size(); ++i)
   {
     const std::string user = "rigid body " + bodies[i].name;
@@ -88,11 +90,10 @@ void add_rigid_bodies(Constraints& constraints, const Mesh& mesh, const std::vec
     for (const std::string& surface : bodies[i].surfaces)
       for (const int node : named_nodes(mesh, surface, user))
       {
-        const auto [place, is_new] = constraints.body_of.emplace(node, static_cast<int>(i));
-        const auto other = static_cast<std::size_t>(place->second);
-        if (other != i)
-          throw Error(node_text(node, mesh.nodes[node]) + " belongs to rigid body " + bodies[other].name + " and to " +
-                      user + "; give each a surface of its own, or make them one body");
+        const auto [place, is_new] = body_of.emplace(node, i);
+        if (place->second != i)
+          throw Error(node_text(node, mesh.nodes[node]) + " belongs to rigid body " + bodies[place->second].name +
+                      " and to " + user + "; give each a surface of its own, or make them one body");
         if (is_new) attach_node(constraints, mesh, node, reference, bodies[i].motions);
       }
   }
@@ -154,24 +155,19 @@ void add_ties(Constraints& constraints, const Mesh& mesh, const Scene& scene)
 }
 
 /// Returns the solid nodes around each joint, a node that shells and solids share and that has a free rotation.
-std::map<int, std::vector<int>> solid_nodes_around_joints(Constraints& constraints, const Mesh& mesh)
+std::map<int, std::set<int>> solid_nodes_around_joints(Constraints& constraints, const Mesh& mesh)
 {
   std::vector<char> is_joint(mesh.nodes.size(), 0);
   for (std::size_t node = 0; node < is_joint.size(); ++node)
     for (int c = 3; c < 6; ++c)
       if (constraints.kind_of(static_cast<int>(node), c) == DofKind::free) is_joint[node] = 1;
-  std::map<int, std::vector<int>> around;
+  std::map<int, std::set<int>> around;
   for (const Element& element : mesh.elements)
   {
     if (is_shell(element.shape)) continue;
     const auto nodes = nodes_of(element);
     for (const int node : nodes)
-      if (is_joint[node]) around[node].insert(around[node].end(), nodes.begin(), nodes.end());
-  }
-  for (auto& [node, nodes] : around)
-  {
-    std::sort(nodes.begin(), nodes.end());
-    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+      if (is_joint[node]) around[node].insert(nodes.begin(), nodes.end());
   }
   return around;
 }

@@ -64,15 +64,6 @@ std::string nonzero_part(Mat A, double sign, const std::filesystem::path& file, 
          format("%g, the largest entry is %g", 2 * worst.magnitude, scale);
 }
 
-/// Whether rank 0 has the file.
-bool is_there(const std::filesystem::path& file, MPI_Comm comm)
-{
-  int found = 0;
-  on_rank_zero(comm, [&] { found = is_file(file) ? 1 : 0; });
-  MPI_Bcast(&found, 1, MPI_INT, 0, comm);
-  return found != 0;
-}
-
 /// Returns A with the pattern of `pattern`, whose entries are zero.
 Owned<Mat> with_pattern(Mat pattern, Mat A)
 {
@@ -137,7 +128,7 @@ void add_skew(const std::filesystem::path& file, PetscInt size, Owned<Mat>& skew
 /// rotations do not matter. Rounding of an exported M moves them by about symmetry_tolerance.
 void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
 {
-  Owned<Mat> D;
+  const Owned<Mat> D = zero_of(M);
   const Owned<Vec> diagonal = vector_of_rows(M);
   PetscReal largest = 0;
   check(MatGetDiagonal(M, diagonal));
@@ -149,7 +140,6 @@ void check_mass(Mat M, const std::filesystem::path& file, MPI_Comm comm)
   for (PetscInt i = 0; i < own_rows(M).size(); ++i)
     if (entries[i] == 0) entries[i] = largest; // a motion without mass
   check(VecRestoreArray(diagonal, &entries));
-  check(MatDuplicate(M, MAT_DO_NOT_COPY_VALUES, D.put()));
   check(MatDiagonalSet(D, diagonal, INSERT_VALUES));
   PencilFactor factor(M, D, Keep::factor, {});
   if (factor.factorise(-10 * symmetry_tolerance) && factor.negative_pivots() > 0)

@@ -150,8 +150,17 @@ MatrixXd in_three_directions(const MatrixXd& S)
   return result;
 }
 
-/// Returns M from the scalar mass S = int rho f f' dV of the shape functions and modes, f = (N, m), and the amplitudes
-/// A of the modes. With S partitioned like f, M = S_NN + A' S_mN + S_Nm A + A' S_mm A in three directions.
+/// Returns what a form S on shape functions and modes, f = (N, m), is in three directions on the nodal displacements,
+/// of which the modes have these amplitudes.
+MatrixXd on_nodes(const MatrixXd& S, const MatrixXd& amplitudes)
+{
+  const Eigen::Index dofs = amplitudes.cols();
+  MatrixXd motion(dofs + amplitudes.rows(), dofs); // of f, of unit nodal displacements
+  motion << MatrixXd::Identity(dofs, dofs), amplitudes;
+  return motion.transpose() * in_three_directions(S) * motion;
+}
+
+/// Returns M from the scalar mass S = int rho f f' dV and the amplitudes A of the modes.
 MatrixXd mass_matrix(Shape shape, const NodePositions& X, const MatrixXd& A, double density)
 {
   const Eigen::Index n = X.cols(), modes = modes_of(shape);
@@ -164,12 +173,9 @@ MatrixXd mass_matrix(Shape shape, const NodePositions& X, const MatrixXd& A, dou
     f << at.N, mode_values(shape, xi);
     S += density * volume * f * f.transpose();
   }
-  MatrixXd M = in_three_directions(S.topLeftCorner(n, n));
-  if (modes == 0) return M;
-  const MatrixXd half = A.transpose() * (in_three_directions(S.bottomLeftCorner(modes, n)) +
-                                         0.5 * in_three_directions(S.bottomRightCorner(modes, modes)) * A);
-  M += half + half.transpose();
-  return M;
+  if (modes == 0) return in_three_directions(S);
+  const MatrixXd M = on_nodes(S, A);
+  return (M + M.transpose()) / 2;
 }
 
 /// Returns G, K_c and the force of src/README.md, section 1.10. The incompatible modes take part in G, as in the mass.
@@ -195,9 +201,7 @@ SpinMatrices spin(Shape shape, const NodePositions& X, const MatrixXd& amplitude
     centrifugal -= mass * along * along.transpose();
     for (Eigen::Index i = 0; i < n; ++i) result.force.segment<3>(3 * i) += mass * along(i) * velocity;
   }
-  MatrixXd motion(3 * (n + modes), 3 * n); // of the functions f, of unit nodal displacements
-  motion << MatrixXd::Identity(3 * n, 3 * n), amplitudes;
-  result.gyroscopic = motion.transpose() * in_three_directions(S) * motion;
+  result.gyroscopic = on_nodes(S, amplitudes);
   result.centrifugal = in_three_directions(centrifugal);
   return result;
 }

@@ -41,6 +41,39 @@ Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_col
   return A;
 }
 
+Owned<IS> set_of(MPI_Comm comm, const std::vector<PetscInt>& places)
+{
+  Owned<IS> set;
+  check(ISCreateGeneral(comm, static_cast<PetscInt>(places.size()), places.data(), PETSC_COPY_VALUES, set.put()));
+  return set;
+}
+
+Owned<IS> set_of(MPI_Comm comm, const IndexRange& range)
+{
+  Owned<IS> set;
+  check(ISCreateStride(comm, range.size(), range.first, 1, set.put()));
+  return set;
+}
+
+Owned<Mat> part_of(Mat A, IS rows, IS columns)
+{
+  Owned<Mat> result;
+  check(MatCreateSubMatrix(A, rows, columns, MAT_INITIAL_MATRIX, result.put()));
+  return result;
+}
+
+void finish(Mat A)
+{
+  check(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+}
+
+void finish(Vec x)
+{
+  check(VecAssemblyBegin(x));
+  check(VecAssemblyEnd(x));
+}
+
 std::pair<PetscInt, PetscInt> local_range(PetscInt count, MPI_Comm comm)
 {
   const PetscInt rank = rank_of(comm), ranks = ranks_of(comm), size = count / ranks, rest = count % ranks;

@@ -118,7 +118,7 @@ void find_shares(const SensitivityProblem& problem, const std::vector<HeldMode>&
   for (const SceneComponent& component : problem.components)
   {
     if (component.doubled.empty()) continue;
-    const BrakeModel doubled = problem.model_with(component.doubled);
+    const Model doubled = problem.model_with(component.doubled);
     for (std::size_t j = 0; j < modes.size(); ++j)
     {
       const auto added = [&](Mat twice, Mat once)
@@ -195,7 +195,7 @@ private:
   std::optional<Residuals> beside(const SceneNumber& number, double step)
   try
   {
-    const BrakeModel model = problem_.model_with(std::array{SceneNumber{number.key, number.value + step}});
+    const Model model = problem_.model_with(std::array{SceneNumber{number.key, number.value + step}});
     const auto& [structure, interface, own] = problem_.sliding;
     const bool same = model.structure.K.get() == structure.K && model.interface.B.get() == interface.B &&
                       model.structure.load.get() == structure.load && same_contact(model.interface, interface);
@@ -295,12 +295,10 @@ void find_probe_derivatives(Mat probes, const HeldMode& mode, ModeCauses& causes
 /// A with `factor` times p p' of the probe's row p added.
 Owned<Mat> with_added(Mat A, Mat probes, int probe, double factor)
 {
-  const IndexRange own = own_columns(probes);
-  Owned<IS> rows, columns;
-  check(ISCreateStride(comm_of(probes), own_rows(probes).holds(probe), probe, 1, rows.put()));
-  check(ISCreateStride(comm_of(probes), own.size(), own.first, 1, columns.put()));
-  Owned<Mat> row, square, result = copy_of(A);
-  check(MatCreateSubMatrix(probes, rows, columns, MAT_INITIAL_MATRIX, row.put()));
+  const MPI_Comm comm = comm_of(probes);
+  const std::vector<PetscInt> rows(own_rows(probes).holds(probe), probe); // on one rank
+  const Owned<Mat> row = part_of(probes, set_of(comm, rows), set_of(comm, own_columns(probes)));
+  Owned<Mat> square, result = copy_of(A);
   check(MatTransposeMatMult(row, row, MAT_INITIAL_MATRIX, PETSC_DEFAULT, square.put()));
   check(MatAXPY(result, factor, square, DIFFERENT_NONZERO_PATTERN));
   check(MatSetOption(result, MAT_SYMMETRIC, PETSC_TRUE));

@@ -45,7 +45,7 @@ public:
   std::optional<ContactChange> contact_change(const SweptPlace& from, const SweptPlace& to, double tolerance);
 
   /// At the point visited last; null: at none.
-  const BrakeModel* model() const { return model_ ? &*model_ : nullptr; }
+  const Model* model() const { return model_ ? &*model_ : nullptr; }
 
   /// Shapes in the basis, and its corrections so far.
   Eigen::Index shapes() const;
@@ -65,7 +65,7 @@ private:
   const SweepProblem& problem_;
   std::function<void()> end_if_asked_;
   Equilibria searched_;
-  std::optional<BrakeModel> model_{}; // at the point visited last
+  std::optional<Model> model_{}; // at the point visited last
   SweptPlace at_{};
   std::map<SweptPlace, Known> known_{};
   std::vector<char> at_every_{}; // pairs closed and rigid at every point prepared

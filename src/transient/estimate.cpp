@@ -62,18 +62,13 @@ double power_at(const PairMotion& pair, double q, double angle)
   return power;
 }
 
-// Of mu at any speed.
-double greatest_coefficient(const FrictionLaw& law)
-{
-  return std::max(friction_coefficient(law, 0).value, law.coefficient);
-}
-
 // What rounding leaves of the integral: the differences in power_at are of terms of this size.
 double rounding(const PairMotion& pair, double q, double length)
 {
   const double force = std::abs(pair.reaction) + pair.reaction0 / q;
   const double velocity = std::hypot(std::abs(pair.velocity[0]), std::abs(pair.velocity[1]));
-  return 100 * std::numeric_limits<double>::epsilon() * greatest_coefficient(pair.law) * force * velocity * length;
+  const double mu = std::max(friction_coefficient(pair.law, 0).value, pair.law.coefficient); // at any speed
+  return 100 * std::numeric_limits<double>::epsilon() * mu * force * velocity * length;
 }
 
 using Rule = boost::math::quadrature::gauss_kronrod<double, 15>;

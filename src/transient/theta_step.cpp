@@ -86,13 +86,6 @@ void move_slip(const OneStep& one, const std::vector<ContactStatus>& statuses)
     if (statuses[i] != ContactStatus::stick) slip.set(i, PairView(moved, interface.directions).vector(i));
 }
 
-/// Work of what no load factor scales. Collective.
-double preload_work(const OneStep& one, const Structure& structure)
-{
-  if (!structure.preload.get() || one.factors.load == 1) return 0;
-  return one.step.h * (1 - one.factors.load) * dot(structure.preload, one.work.v_theta);
-}
-
 /// Works of the step from the products at both ends; all reductions in one message.
 void account(const OneStep& one, const Structure& structure)
 {
@@ -105,7 +98,9 @@ void account(const OneStep& one, const Structure& structure)
   report.energy = (kinetic + potential) / 2;
   report.damping_work = damping / step.theta;
   report.contact_work = contact;
-  report.load_work = step.h * step_factors.load * load + preload_work(one, structure);
+  report.load_work = step.h * step_factors.load * load;
+  if (structure.preload.get() && step_factors.load != 1) // no factor scales it
+    report.load_work += step.h * (1 - step_factors.load) * dot(structure.preload, work.v_theta);
   report.drive_work = drive_work(one);
   report.joint_work = joint_work(one);
   report.energy_defect = report.energy - work.energy - (0.5 - step.theta) * (dMd + step.h * dKd) + report.damping_work -
@@ -224,19 +219,6 @@ Owned<Mat> step_matrix(const Structure& structure, double h, double theta)
   return A;
 }
 
-namespace
-{
-
-/// What the compliance of the pairs adds to the diagonal of W; empty: nothing.
-std::vector<double> added_by_compliance(const ThetaStep& step, const Interface& interface)
-{
-  std::vector<double> added = compliance_of_rows(interface);
-  for (double& c : added) c = compliant_gap(c, step.theta, step.h).by_reaction;
-  return added;
-}
-
-} // namespace
-
 ThetaStep make_theta_step(const Structure& structure, const Interface& interface, double h, double theta,
                           const StepOptions& options)
 {
@@ -249,9 +231,10 @@ ThetaStep make_theta_step(const Structure& structure, const Interface& interface
   step.contact = options.contact;
   step.factor = factor_held(step_matrix(structure, h, theta), interface, structure.names, options.factor);
   step.factor_seconds = MPI_Wtime() - start;
+  std::vector<double> added = compliance_of_rows(interface); // to the diagonal of W
+  for (double& c : added) c = compliant_gap(c, theta, h).by_reaction;
   if (interface.pairs > 0)
-    step.W = make_contact_operator(step.factor, h, added_by_compliance(step, interface), interface.pairs,
-                                   interface.directions, comm_of(interface.B));
+    step.W = make_contact_operator(step.factor, h, added, interface.pairs, interface.directions, comm_of(interface.B));
   step.matrices = pair_matrices(structure.M, structure.K);
   step.condensed_seconds = MPI_Wtime() - start - step.factor_seconds;
   return_freed_memory(); // fronts of the factor, and what W was added up from
@@ -305,13 +288,7 @@ StepFactors step_factors(const Ramps& ramps, const ThetaStep& step, double time)
 }
 
 StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
-                   State& state)
-{
-  return advance(step, structure, interface, {}, work, state);
-}
-
-StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                   const StepFactors& factors, StepWork& work, State& state)
+                   State& state, const StepFactors& factors)
 {
   StepReport report;
   const OneStep one{step, interface, factors, work, state, report};

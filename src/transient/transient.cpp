@@ -76,11 +76,6 @@ struct Fluctuation
   Owned<Vec> Ku0, du, Kdu;
 };
 
-Fluctuation about(const Structure& structure, const Equilibrium& equilibrium)
-{
-  return {equilibrium.u, product(structure.K, equilibrium.u), zeros_like(structure.load), zeros_like(structure.load)};
-}
-
 /// Differences are taken before products: near equilibrium du'K du is a small part of u'K u.
 void update(Fluctuation& fluctuation, const State& state, const StepWork& work)
 {
@@ -233,7 +228,8 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
   const auto& [structure, interface, equilibrium] = sliding;
   const auto& [probes, history, monitor, records, checkpoint, ramps] = recorder;
   MarchSummary summary;
-  Fluctuation fluctuation = about(structure, equilibrium);
+  Fluctuation fluctuation{equilibrium.u, product(structure.K, equilibrium.u), zeros_like(structure.load),
+                          zeros_like(structure.load)};
   Owned<Vec> probe_values;
   if (probes)
   {
@@ -255,7 +251,7 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     const auto next = static_cast<std::size_t>(summary.steps);
     work.record = next < records.size() ? &records[next] : nullptr;
     const StepFactors factors = ramps ? step_factors(*ramps, step, state.time) : StepFactors{};
-    const StepReport report = advance(step, structure, interface, factors, work, state);
+    const StepReport report = advance(step, structure, interface, work, state, factors);
     ++summary.steps;
     if (!report.contact_converged && summary.unconverged++ == 0) summary.first_unconverged = state.time;
     summary.contact_residual_max = std::max(summary.contact_residual_max, report.contact_residual);

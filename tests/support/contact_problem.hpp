@@ -30,4 +30,14 @@ inline ContactResult solve_contact(const ContactOperator& W, const std::vector<d
   return squeal::solve_contact(W, friction, settings, {b, r, nothing});
 }
 
+/// The residual of reactions r: of a solution by no iteration. On the ranks that have W.
+inline double contact_residual(const ContactOperator& W, const PairFriction& friction, const std::vector<double>& b,
+                               std::vector<double> r)
+{
+  ContactMemory nothing;
+  return squeal::solve_contact(W, friction, {.solver = ContactSolver::fixed_point, .max_iterations = 0},
+                               {b, r, nothing})
+      .residual;
+}
+
 } // namespace squeal::test

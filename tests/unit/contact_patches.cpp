@@ -8,6 +8,7 @@
 #include <limits>
 
 using namespace squeal;
+using test::contact_residual;
 using test::difference;
 using test::solve_contact;
 

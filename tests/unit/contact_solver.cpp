@@ -7,6 +7,7 @@
 #include <random>
 
 using namespace squeal;
+using test::contact_residual;
 using test::difference;
 using test::solve_contact;
 using test::uniform;

@@ -73,7 +73,10 @@ TEST_CASE("a solid numbered inside out is mended, mid-sides too")
     FileMesh file;
     file.nodes = reference(shape);
     ElementBlock block{3, gmsh_type(shape), "", node_count(shape), {}, {"body"}};
-    block.nodes = mirrored_order(shape);
+    Element inside_out{shape, 0, {}};
+    std::iota(inside_out.nodes.begin(), inside_out.nodes.end(), 0);
+    mirror(inside_out);
+    block.nodes.assign(inside_out.nodes.begin(), inside_out.nodes.begin() + node_count(shape));
     file.blocks = {block};
     Scene scene;
     scene.parts = {{"body", {}, 0, {}}};

@@ -29,7 +29,7 @@ Scene two_points()
 }
 
 /// Whether M, C, K, the load and B are the same objects.
-std::array<bool, 5> shared_parts(const BrakeModel& a, const BrakeModel& b)
+std::array<bool, 5> shared_parts(const Model& a, const Model& b)
 {
   return {a.structure.M.get() == b.structure.M, a.structure.C.get() == b.structure.C,
           a.structure.K.get() == b.structure.K, a.structure.load.get() == b.structure.load,
@@ -46,7 +46,7 @@ double difference(Mat A, Mat B)
 }
 
 /// The model is that of the scene with these numbers, built from nothing.
-void check_model(const BrakeModel& model, const Scene& scene, const std::vector<SceneNumber>& numbers)
+void check_model(const Model& model, const Scene& scene, const std::vector<SceneNumber>& numbers)
 {
   Scene other = scene_with(scene, numbers);
   const Model built = build_model(other, PETSC_COMM_WORLD);
@@ -75,7 +75,7 @@ TEST_CASE("a number makes anew the parts that it enters alone, whatever number w
   Scene scene = two_points();
   const Model model = build_model(scene, PETSC_COMM_WORLD);
   NearbyModels models(model, scene);
-  const BrakeModel own = models.at({});
+  const Model own = models.at({});
   CHECK(own.structure.K.get() == model.structure.K);
   const std::vector<Kind> kinds = {
       {{"friction.coefficient", 0.4}, {true, true, true, true, true}},
@@ -91,7 +91,7 @@ TEST_CASE("a number makes anew the parts that it enters alone, whatever number w
   for (const Kind& kind : kinds)
   {
     CAPTURE(kind.number.key);
-    const BrakeModel changed = models.at({&kind.number, 1});
+    const Model changed = models.at({&kind.number, 1});
     std::array<bool, 5> same = shared_parts(changed, own);
     if (kind.number.key == "spring.0.stiffness") same[0] = true; // of one assembly with K
     CHECK(same == kind.same_part);

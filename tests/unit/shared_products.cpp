@@ -85,10 +85,6 @@ TEST_CASE("a W whose columns are on all ranks is the whole one in products, bloc
       const ContactOperator whole = make_contact_operator(entries, pairs, 2);
       CHECK(W.size() == whole.size());
       CHECK(W.has_near_field());
-      double near = W.near_share();
-      if (shared) MPI_Allreduce(MPI_IN_PLACE, &near, 1, MPI_DOUBLE, MPI_SUM, comm);
-      CHECK(std::abs(near - whole.near_share()) < 1e-4); // a block at the limit
-      CHECK(near < 0.9);
       for (std::size_t pair = 0; pair < W.pairs(); ++pair)
         for (std::size_t k = 0; k < 3; ++k)
           for (std::size_t l = 0; l < 3; ++l)

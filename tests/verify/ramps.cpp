@@ -48,7 +48,7 @@ Moved move(const SmallModel& model, const Ramps& ramps, double end, int steps, d
   Moved moved;
   for (int i = 0; i < steps; ++i)
   {
-    const StepReport report = advance(step, structure, interface, step_factors(ramps, step, state.time), work, state);
+    const StepReport report = advance(step, structure, interface, work, state, step_factors(ramps, step, state.time));
     REQUIRE(report.contact_converged);
     moved.energy = report.energy;
     moved.load += report.load_work;

@@ -144,7 +144,7 @@ TEST_CASE("a load that rises slowly in time comes to the equilibrium of the path
   {
     StepFactors factors;
     factors.load = std::min(1., (i + 0.5) / steps);
-    (void)advance(step, model.structure, model.interface, factors, work, state);
+    (void)advance(step, model.structure, model.interface, work, state, factors);
   }
   CHECK(state.reactions[0] == doctest::Approx(exact).epsilon(5e-3));
 }

@@ -20,9 +20,9 @@ struct BrakeBranch
 struct BrakeBranchProblem
 {
   const BranchSettings& settings;
-  std::function<BrakeModel(double parameter)> model_at; // with matrices of the layout of the scene's own
-  CycleProblem own;                                     // of the scene itself
-  const LimitCycle& cycle;                              // where the branch starts
+  std::function<Model(double parameter)> model_at; // with matrices of the layout of the scene's own
+  CycleProblem own;                                // of the scene itself
+  const LimitCycle& cycle;                         // where the branch starts
   int steps_per_period = 0;
   double tolerance = 0; // on the full-space residual
   const EquilibriumOptions& equilibrium_options;

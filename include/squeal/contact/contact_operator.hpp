@@ -88,7 +88,6 @@ public:
   /// The same by the near field, in the rows of this rank's pairs. Small operators have none.
   void add_product(std::size_t pair, const PairVector& change, std::span<float> w) const;
   bool has_near_field() const { return !near_.empty(); }
-  double near_share() const; // entries of the near field on this rank over those of W
 
   /// The turns in which ranks sweep over all pairs: all at once, slices that push each other little, or one by one.
   const std::vector<Turn>& side_by_side() const { return side_by_side_; }

@@ -29,11 +29,18 @@ struct Interface
   std::size_t size() const { return PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs)); }
 };
 
-/// The structure of a scene, or of the scene with other numbers, and its contact.
-struct BrakeModel
+/// The model of a scene, which every stage works on. That of a scene with other numbers has structure and contact
+/// alone.
+struct Model
 {
+  // On rank 0; empty on a matrix scene. Scenes with stages that make models on groups of ranks, [sweep] and
+  // [robustness], have the mesh on every rank.
+  Mesh mesh;
+  DofMap dofs; // rank 0's; elsewhere its size alone
   Structure structure;
   Interface interface;
+  std::vector<Coverage> coverage; // one a contact; empty on a matrix scene
+  Owned<Mat> probes;              // a row per probe of the scene
 };
 
 /// Velocity of the rotor's surface, by its rotation or as given [m/s]; zero on the axis itself, round-off aside.
@@ -47,6 +54,9 @@ Interface make_interface(const std::vector<ContactPair>& pairs, const Scene& sce
 /// Collective. Error: a file that is damaged, or whose sizes disagree with the others or with the structure.
 Interface read_interface(const std::filesystem::path& folder, const Structure& structure, const FrictionLaw& friction,
                          MPI_Comm comm);
+
+/// A pair in messages: its number, contact and place. Not collective.
+std::string place_of_pair(const Interface& interface, std::size_t pair);
 
 /// A contact that shares B with this one.
 Interface sharing(const Interface& interface);

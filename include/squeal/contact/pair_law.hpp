@@ -255,18 +255,12 @@ struct NaturalScale
 /// 1/A_nn and 1/max A_tt; `otherwise`: a compliance in place of a zero A_nn.
 NaturalScale natural_scale(const PairBlock& A, double otherwise);
 
-/// |r - max(0, r - rho w)|: the natural map of the unilateral law alone.
-inline double normal_map(double r, double w, double rho)
-{
-  return std::abs(r - std::max(0., r - rho * w));
-}
-
 /// |r - proj(r - rho w)|: zero where the law holds. The disc's radius is mu r_n, since r_n has its own row.
 inline double natural_map(const PairVector& r, const PairVector& w, const FrictionLaw& law, const NaturalScale& rho)
 {
   const double t1 = r[1] - rho.tangential * w[1], t2 = r[2] - rho.tangential * w[2];
   const double shrink = disc_factor(t1, t2, coefficient_at(law, w) * std::max(0., r[0]));
-  const double normal = normal_map(r[0], w[0], rho.normal), d1 = r[1] - shrink * t1, d2 = r[2] - shrink * t2;
+  const double normal = r[0] - std::max(0., r[0] - rho.normal * w[0]), d1 = r[1] - shrink * t1, d2 = r[2] - shrink * t2;
   return std::sqrt(normal * normal + d1 * d1 + d2 * d2);
 }
 
@@ -286,10 +280,7 @@ inline PairVector pair_velocity(const PairBlock& A, const PairVector& r, const P
 /// w - A r: q of the local problem, what the other pairs leave.
 inline PairVector velocity_without(const PairBlock& A, const PairVector& r, const PairVector& w)
 {
-  PairVector q = w;
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t j = 0; j < 3; ++j) q[i] -= A[i][j] * r[j];
-  return q;
+  return pair_velocity(A, {-r[0], -r[1], -r[2]}, w);
 }
 
 /// The reaction that iterations start with where `r` gives w = A r + q: admissible, and of two levels of mu stick

@@ -66,8 +66,4 @@ struct ContactProblem
 ContactResult solve_contact(const ContactOperator& W, const PairFriction& friction, const ContactSettings& settings,
                             const ContactProblem& problem);
 
-/// The residual above of reactions r to the free velocities b. On the ranks that have W.
-double contact_residual(const ContactOperator& W, const PairFriction& friction, const std::vector<double>& b,
-                        const std::vector<double>& r);
-
 } // namespace squeal

@@ -32,7 +32,7 @@ struct ClosedContact
 ClosedContact eliminate_closed_pairs(const Structure& structure, const Interface& interface,
                                      const std::vector<char>& closed);
 
-/// Y'A Z. Collective.
+/// Y'A Z; of no A none. Collective.
 Owned<Mat> project(Mat A, Mat Y, Mat Z);
 
 /// Z'A Z, marked symmetric. Collective.

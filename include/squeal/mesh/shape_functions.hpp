@@ -79,9 +79,8 @@ std::vector<std::vector<int>> faces_of(const Element& element);
 /// Returns the face of an element with these corner nodes, in their order, and with the element's nodes between them.
 Face face_on(const Element& element, std::span<const int> corners);
 
-/// Returns the node order of the mirrored element: entry i is the old number of the new node i.
-/// An element numbered inside out has a positive Jacobian in this order.
-std::vector<int> mirrored_order(Shape shape);
+/// Reverses the orientation of an element: one numbered inside out has a positive Jacobian then.
+void mirror(Element& element);
 
 // Quadrature rules on the reference elements, each with the shape functions at its points. Rules are made once and
 // live as long as the program.

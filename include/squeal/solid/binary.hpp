@@ -18,6 +18,9 @@ struct MatrixSize
   PetscInt rows = 0, columns = 0;
 };
 
+/// Whether rank 0 has the file.
+bool is_there(const std::filesystem::path& file, MPI_Comm comm);
+
 /// Returns the size of the matrix in a file. Throws Error if its length, kind, row counts or columns are wrong.
 MatrixSize check_matrix_file(const std::filesystem::path& file, MPI_Comm comm);
 

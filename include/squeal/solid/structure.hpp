@@ -85,6 +85,15 @@ SparseRow displacement_row(const DofMap& dofs, std::span<const PairNode> nodes, 
 /// Returns the AIJ matrix with this rank's rows. Collective.
 Owned<Mat> matrix_of_rows(const std::vector<SparseRow>& rows, PetscInt local_columns, MPI_Comm comm);
 
+/// Sets of this rank's rows or columns, and the part of A in them. Collective.
+Owned<IS> set_of(MPI_Comm comm, const std::vector<PetscInt>& places);
+Owned<IS> set_of(MPI_Comm comm, const IndexRange& range);
+Owned<Mat> part_of(Mat A, IS rows, IS columns);
+
+/// Ends the assembly of a matrix, or of a vector. Collective.
+void finish(Mat A);
+void finish(Vec x);
+
 /// Returns this rank's range [first, last) of `count` items that are shared equally among the ranks in order. Not
 /// collective.
 std::pair<PetscInt, PetscInt> local_range(PetscInt count, MPI_Comm comm);

@@ -71,9 +71,9 @@ struct SensitivityProblem
   const Modes& modes;
   std::vector<SceneNumber> numbers;
   std::vector<SceneComponent> components;
-  std::vector<std::string> contacts;                                    // names
-  std::function<BrakeModel(std::span<const SceneNumber>)> model_with{}; // the scene with other values
-  Mat probes = nullptr;                                                 // a row a probe
+  std::vector<std::string> contacts;                               // names
+  std::function<Model(std::span<const SceneNumber>)> model_with{}; // the scene with other values
+  Mat probes = nullptr;                                            // a row a probe
   const std::vector<Change>& changes;
   std::vector<int> probes_of_changes; // their rows
   const ModesSettings& modes_settings;

@@ -71,7 +71,7 @@ struct Sweep
 struct SweepProblem
 {
   SweepSettings settings;
-  std::function<BrakeModel(std::span<const double> values)> model_at;
+  std::function<Model(std::span<const double> values)> model_at;
   const ModesSettings& modes;
   const ModesOptions& modes_options;
   const EquilibriumOptions& equilibrium_options;

@@ -1,7 +1,7 @@
 #pragma once
 /// A model at one set of scene numbers, with its small motions about sliding.
 #include "squeal/base/constants.hpp"
-#include "squeal/contact/model.hpp"
+#include "squeal/contact/interface.hpp"
 #include "squeal/transient/estimate.hpp"
 
 #include <cmath>

@@ -159,11 +159,7 @@ struct StepReport
 
 /// One step in place.
 StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
-                   State& state);
-
-/// The same with factors on load, drive and friction.
-StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                   const StepFactors& factors, StepWork& work, State& state);
+                   State& state, const StepFactors& factors = {});
 
 // The exact tangent of theta steps along a recorded motion (src/README.md, section 4.13).
 //
