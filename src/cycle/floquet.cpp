@@ -106,15 +106,6 @@ struct RecordedPeriods
   std::array<std::vector<StepRecord>, count> records; // that of other steps may be empty
 };
 
-/// The records without what a tangent of the full model needs beyond contact.
-std::vector<StepRecord> contact_of(const std::vector<StepRecord>& records)
-{
-  std::vector<StepRecord> contact;
-  for (const StepRecord& record : records)
-    contact.push_back({record.wanted, record.reactions, record.contact_velocity, record.opposes_theta, {}, {}, {}});
-  return contact;
-}
-
 /// Leaves the map with its own period recorded, which the shooting may have done already.
 RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, Vec start)
 {
@@ -127,7 +118,7 @@ RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, V
     result.records[RecordedPeriods::other] = std::move(other.records);
   }
   record_period(map, period, start, {});
-  result.records[RecordedPeriods::own] = contact_of(map.records);
+  result.records[RecordedPeriods::own] = map.records;
   std::vector<StepRecord> own = std::exchange(map.records, {});
   record_period(map, period, start, {0.5});
   result.records[RecordedPeriods::moved] = std::exchange(map.records, std::move(own));

@@ -167,7 +167,7 @@ void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& gri
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
   if (grid.shift > 0) move_by_part(map, grid.shift, state);
   map.recorded_start = {};
-  map.records = record_steps(map.step, map.sliding.structure, map.sliding.interface, state, steps, Recorded::contact);
+  map.records = record_steps(map.step, map.sliding.structure, map.sliding.interface, state, steps);
   if (grid.shift > 0 || steps != map.steps) return;
   map.recorded_start = copy_of(start);
   map.recorded_step = map.step.h;
@@ -179,7 +179,7 @@ namespace
 void apply_tangent(const PeriodMap& map, std::span<const Vec> states)
 {
   std::vector<TangentColumn> columns;
-  for (const Vec state : states) columns.push_back({copy_of(displacement(state)), copy_of(velocity(state)), 0, 0});
+  for (const Vec state : states) columns.push_back({copy_of(displacement(state)), copy_of(velocity(state))});
   advance_tangents(map.step, map.sliding.structure, map.sliding.interface, map.records, columns);
   for (std::size_t k = 0; k < states.size(); ++k)
   {

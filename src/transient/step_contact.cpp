@@ -176,11 +176,6 @@ void record_contact(const Interface& interface, const State& state, const std::v
     record.opposes_theta.push_back(opposes_end(PairView(past, interface.directions), i) ? 0 : 1);
   MPI_Bcast(record.contact_velocity.data(), to_int(interface.size()), MPI_DOUBLE, 0, comm);
   MPI_Bcast(record.opposes_theta.data(), interface.pairs, MPI_CHAR, 0, comm);
-  if (record.wanted == Recorded::contact) return;
-  record.gap = interface.gap;
-  const std::vector<double> position = relative(interface, state.u);
-  for (std::size_t i = 0; i < record.gap.size(); ++i)
-    record.gap[i] += PairView(position, interface.directions).normal(i);
 }
 
 /// Solves the problem, again where pairs turned. Which ones do is told loosely where joints take many sweeps.

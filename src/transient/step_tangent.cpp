@@ -1,5 +1,5 @@
 /// A column is a motion without load and drive whose contact is linear: with M dv, A dv and K du at hand a step solves
-///     A dv_f = [M dv - (1-theta) A dv]/theta - h K du + force dh,      A dv+ = A dv_f + h B' dr,
+///     A dv_f = [M dv - (1-theta) A dv]/theta - h K du,      A dv+ = A dv_f + h B' dr,
 /// and A dv+ is the right-hand side just solved for, as in the step itself.
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/constants.hpp"
@@ -21,7 +21,6 @@ namespace
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 constexpr std::size_t at_once = 64; // columns: their work vectors take ten times a column's memory
 
@@ -58,28 +57,13 @@ TangentWork begin_tangents(const ThetaStep& step, const Structure& structure, st
   return work;
 }
 
-/// Changes of the start of a step that a pair sees.
-struct NormalChange
+/// db_n of a pair but B_n dv_f, by a change of its gap at ut [m] and of B_n v [m/s].
+double change_of_gap_rate(const ThetaStep& step, double compliance, double moved, double rate)
 {
-  double moved = 0;     // [m] of the gap at ut
-  double rate = 0;      // [m/s] of B_n v
-  double step_size = 0; // [s]
-};
-
-/// db_n of a pair but B_n dv_f.
-double change_of_gap_rate(const ThetaStep& step, const Interface& interface, const StepRecord& record, std::size_t pair,
-                          const NormalChange& change)
-{
-  const double h = step.h, c = compliance_of(interface, pair);
-  if (c == 0) return change.moved / h - (change.step_size != 0 ? change.step_size * record.gap[pair] / (h * h) : 0);
-  const CompliantGap law = compliant_gap(c, step.theta, h);
-  const double moved = change.moved - h * (1 - step.theta) * change.rate; // at u
-  double result = law.by_gap * moved + law.by_rate * change.rate;
-  if (change.step_size != 0)
-    result -= change.step_size / h *
-              (law.by_gap * record.gap[pair] +
-               law.by_reaction * PairView(record.reactions, interface.directions).normal(pair));
-  return result;
+  const double h = step.h;
+  if (compliance == 0) return moved / h;
+  const CompliantGap law = compliant_gap(compliance, step.theta, h);
+  return law.by_gap * (moved - h * (1 - step.theta) * rate) + law.by_rate * rate; // the gap's change at u
 }
 
 /// db of every column but B dv_f, on every rank.
@@ -103,7 +87,7 @@ MatrixXd contact_of_start(const ThetaStep& step, const Interface& interface, con
     for (std::size_t pair = 0; pair < change.pairs(); ++pair)
     {
       change.normal(pair) =
-          change_of_gap_rate(step, interface, record, pair, {moved.normal(pair), s.normal(pair), columns[k].step_size});
+          change_of_gap_rate(step, compliance_of(interface, pair), moved.normal(pair), s.normal(pair));
       if (!record.opposes_theta[pair]) continue;
       for (std::size_t d = 0; d < s.tangential(pair).size(); ++d)
         change.tangential(pair)[d] = past * s.tangential(pair)[d];
@@ -135,8 +119,7 @@ std::shared_ptr<const LinearContact> contact_of_step(const RecordedStep& of, con
 }
 
 /// dr of every column, on every rank. `Bv_free`: B dv_f of each, on rank 0.
-MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> columns, MatrixXd db,
-                   const std::vector<double>& Bv_free)
+MatrixXd reactions(const RecordedStep& of, MatrixXd db, const std::vector<double>& Bv_free)
 {
   const auto& [step, structure, interface, record, entries, room] = of;
   MatrixXd dr = MatrixXd::Zero(db.rows(), db.cols());
@@ -146,11 +129,7 @@ MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> column
     const auto contact = contact_of_step(of, W);
     if (contact->is_open()) return;
     db += MatrixXd::Map(Bv_free.data(), db.rows(), db.cols());
-    Eigen::RowVectorXd dmu(db.cols());
-    for (Index k = 0; k < dmu.size(); ++k) dmu(k) = columns[static_cast<std::size_t>(k)].friction;
-    const VectorXd& of_coefficient = contact->by_coefficient();
-    if (!dmu.isZero(0)) db += W * of_coefficient * dmu;
-    dr = contact->reactions(contact->solve(contact->rows_of(db))) + of_coefficient * dmu;
+    dr = contact->reactions(contact->solve(contact->rows_of(db)));
   };
   on_rank_zero(comm_of(interface.B), find);
   MPI_Bcast(dr.data(), to_int(dr.size()), MPI_DOUBLE, 0, comm_of(interface.B));
@@ -167,7 +146,7 @@ void solve_columns(const RecordedStep& of, std::span<const TangentColumn> column
   std::vector<double> lambda;
   if (interface.pairs > 0)
   {
-    dr = step.h * reactions(of, columns, std::move(db), Bv_free);
+    dr = step.h * reactions(of, std::move(db), Bv_free);
     for (std::size_t k = 0; k < columns.size(); ++k)
     {
       const double* const impulse = dr.col(static_cast<Index>(k)).data();
@@ -187,10 +166,7 @@ void one_step(const RecordedStep& of, std::span<TangentColumn> columns, TangentW
   MatrixXd db;
   if (interface.pairs > 0) db = contact_of_start(step, interface, record, columns, work);
   for (std::size_t k = 0; k < columns.size(); ++k)
-  {
     check(VecAXPBYPCZ(Av[k], 1 / theta, -h, (theta - 1) / theta, work.Mv[k], work.Ku[k]));
-    if (columns[k].step_size != 0) check(VecAXPY(Av[k], columns[k].step_size, record.force));
-  }
   if (structure.G.get())
   {
     std::vector<Vec> v;
@@ -203,7 +179,6 @@ void one_step(const RecordedStep& of, std::span<TangentColumn> columns, TangentW
   {
     TangentColumn& column = columns[k];
     check(VecAXPBYPCZ(column.u, h * theta, h * (1 - theta), 1, v_next[k], column.v));
-    if (column.step_size != 0) check(VecAXPY(column.u, column.step_size, record.v_theta));
     check(VecCopy(v_next[k], column.v));
   }
   std::vector<Vec> u;
@@ -214,13 +189,12 @@ void one_step(const RecordedStep& of, std::span<TangentColumn> columns, TangentW
 } // namespace
 
 std::vector<StepRecord> record_steps(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                                     State& state, int steps, Recorded wanted)
+                                     State& state, int steps)
 {
   std::vector<StepRecord> records(static_cast<std::size_t>(steps));
   StepWork work = begin_steps(step, structure, interface, state);
   for (StepRecord& record : records)
   {
-    record.wanted = wanted;
     work.record = &record;
     (void)advance(step, structure, interface, work, state);
     end_if_asked(comm_of(structure.load));

@@ -117,16 +117,6 @@ void load_free_step(const ThetaStep& step, const Structure& structure, double fa
   if (structure.preload.get()) check(VecAXPY(work.Av_next, step.h * (1 - factor), structure.preload));
 }
 
-/// The rates of h, from a step that is complete: `account` left M dv and K du in Mv and Ku.
-void record_rates(const ThetaStep& step, const StepWork& work)
-{
-  StepRecord& record = *work.record;
-  if (record.wanted == Recorded::contact) return;
-  record.v_theta = copy_of(work.v_theta.get());
-  record.force = copy_of(work.Mv.get());
-  check(VecAXPBY(record.force, -step.theta, 1 / step.h, work.Ku));
-}
-
 /// Adds h B'r of the reactions to A v+, and keeps it in f; returns -h r.
 std::vector<double> apply_reactions(const OneStep& one)
 {
@@ -318,7 +308,6 @@ StepReport advance(const ThetaStep& step, const Structure& structure, const Inte
   for (const ContactStatus status : statuses)
     ++(status == ContactStatus::open ? report.open : status == ContactStatus::stick ? report.stick : report.slip);
   move_slip(one, statuses);
-  if (work.record) record_rates(step, work);
   check(VecCopy(work.v_next, state.v));
   std::swap(work.Mv, work.Mv_next);
   std::swap(work.Av, work.Av_next);

@@ -47,9 +47,9 @@ struct TangentCase
   int steps = 150;
 };
 
-inline std::vector<double> end_of(const SmallModel& model, const TangentCase& start, const std::array<double, 3>& d)
+inline std::vector<double> end_of(const SmallModel& model, const TangentCase& start, const std::array<double, 2>& d)
 {
-  const ThetaStep step = make_theta_step(model.structure, model.interface, start.h + d[2], 0.5, tight_contact());
+  const ThetaStep step = make_theta_step(model.structure, model.interface, start.h, 0.5, tight_contact());
   std::vector<double> u = start.u, v = start.v;
   for (std::size_t i = 0; i < u.size(); ++i)
   {
@@ -63,24 +63,22 @@ inline std::vector<double> end_of(const SmallModel& model, const TangentCase& st
   return end;
 }
 
-/// The tangent in u, v and h is the central difference quotient of the steps.
+/// The tangent in u and v is the central difference quotient of the steps.
 inline void check_tangent(const SmallModel& model, const TangentCase& start)
 {
   const ThetaStep step = make_theta_step(model.structure, model.interface, start.h, 0.5, tight_contact());
   State state = state_of(model.structure, start.u, start.v);
-  const std::vector<StepRecord> records =
-      record_steps(step, model.structure, model.interface, state, start.steps, Recorded::contact_and_rates);
+  const std::vector<StepRecord> records = record_steps(step, model.structure, model.interface, state, start.steps);
   const std::vector<double> nothing(start.u.size(), 0.);
   const Mat K = model.structure.K;
-  std::vector<TangentColumn> columns(3);
-  for (std::size_t k = 0; k < 3; ++k)
-    columns[k] = {vector_like(K, k == 0 ? start.du : nothing), vector_like(K, k == 1 ? start.dv : nothing),
-                  k == 2 ? 1. : 0., 0};
+  std::vector<TangentColumn> columns(2);
+  for (std::size_t k = 0; k < 2; ++k)
+    columns[k] = {vector_like(K, k == 0 ? start.du : nothing), vector_like(K, k == 1 ? start.dv : nothing)};
   advance_tangents(step, model.structure, model.interface, records, columns);
-  for (std::size_t k = 0; k < 3; ++k)
+  for (std::size_t k = 0; k < 2; ++k)
   {
     const double e = 1e-6;
-    std::array<double, 3> up{}, down{};
+    std::array<double, 2> up{}, down{};
     up[k] = e;
     down[k] = -e;
     const std::vector<double> above = end_of(model, start, up), below = end_of(model, start, down);
@@ -88,7 +86,7 @@ inline void check_tangent(const SmallModel& model, const TangentCase& start)
     for (const double entry : all_entries(columns[k].v)) found.push_back(entry);
     for (std::size_t i = 0; i < found.size();
          ++i) // rounding 1e-13/e and curvature e^2, times the growth over the steps
-      CHECK(std::abs(found[i] - (above[i] - below[i]) / (2 * e)) < 1e-6 * (k == 2 ? start.steps : 1));
+      CHECK(std::abs(found[i] - (above[i] - below[i]) / (2 * e)) < 1e-6);
   }
 }
 

@@ -27,29 +27,15 @@ struct StepOptions
 
 // What the tangent of a step needs to know of it (src/README.md, section 4.13). `advance` fills it where one is given.
 
-/// What of a step is recorded.
-enum class Recorded
-{
-  contact,
-  contact_and_rates, // the column of h needs the rates
-};
-
 class LinearContact;
 
 /// The record of one step; that of a reduced model has the contact of its active pairs alone.
 struct StepRecord
 {
-  Recorded wanted = Recorded::contact;
-
   // the same on every rank
   std::vector<double> reactions;        // [N] r+
   std::vector<double> contact_velocity; // [m/s] w = W r+ + b
   std::vector<char> opposes_theta;      // chi of each pair: 1 where friction opposes s_theta (section 4.3)
-
-  // rates
-  Owned<Vec> force;        // [N] M (v+ - v)/h - theta K (u+ - u)
-  Owned<Vec> v_theta;      // [m/s]
-  std::vector<double> gap; // [m] g0 + B_n u of each pair, on every rank
 
   mutable std::shared_ptr<const LinearContact> linear{}; // kept by rank 0 for the columns to come, where there is room
 };
@@ -168,17 +154,15 @@ StepReport advance(const ThetaStep& step, const Structure& structure, const Inte
 //
 // Caveat: the step is piecewise smooth. The tangent does not see a change of the start that changes a status.
 
-/// A change of the state and its causes besides the change of the start.
+/// A change of the state.
 struct TangentColumn
 {
-  Owned<Vec> u, v;      // du [m], dv [m/s]
-  double step_size = 0; // [s] dh of every step; the records then need their rates
-  double friction = 0;  // change of the friction law's coefficient in every step
+  Owned<Vec> u, v; // du [m], dv [m/s]
 };
 
 /// The records of `steps` steps made in place. Collective. The state becomes that at their end.
 std::vector<StepRecord> record_steps(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                                     State& state, int steps, Recorded wanted);
+                                     State& state, int steps);
 
 /// From changes at the start of the recorded steps to those at their end, in place. Collective.
 void advance_tangents(const ThetaStep& step, const Structure& structure, const Interface& interface,
