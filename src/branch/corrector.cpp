@@ -93,7 +93,7 @@ std::optional<BranchPoint> correct(BranchCorrector& corrector, const BorderedVec
   for (int iteration = 0; iteration <= most_iterations; ++iteration)
   {
     if (!makes_progress(corrector, orbit, first_residual)) break;
-    record_full(corrector.log, ShootingStage::multisecant, orbit);
+    record(corrector.log, ShootingStage::multisecant, orbit, 2 * dofs_of(orbit.state) + 1);
     if (orbit.residual <= problem.tolerance) return BranchPoint{std::move(orbit), z.parameter, corrections};
     if (!(best && best->orbit.residual <= orbit.residual)) best = BranchPoint{copy_of(orbit), z.parameter, corrections};
     since_progress = orbit.residual < progress * least ? 0 : since_progress + 1;

@@ -3,7 +3,6 @@
 #include "squeal/base/cost.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/cycle/floquet.hpp"
-#include "step_refinement.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -194,16 +193,10 @@ Owned<Vec> fluctuation_of(const CycleProblem& problem, const State& state)
 
 } // namespace
 
-void estimate_reduced_step_errors(ReducedSearch& search, const ReducedCycle& cycle)
+ReducedCycle cycle_at_twice_the_steps(ReducedSearch& search, const ReducedCycle& cycle)
 {
-  Fidelity& fidelity = search.fidelity;
-  const int steps = search.problem.settings.steps_per_period;
-  ReducedMap finer = period_map_of(search, 2 * steps);
-  const ReducedCycle twice = shoot_at(search, finer, cycle.motion, cycle.period);
-  const RelativeChange errors =
-      step_errors_of({{2 * steps, twice.period, twice.energy}, {steps, cycle.period, cycle.energy}});
-  fidelity.step_frequency_error = twice.converged ? errors.frequency : std::nan("");
-  fidelity.step_energy_error = twice.converged ? errors.energy : std::nan("");
+  ReducedMap finer = period_map_of(search, 2 * search.problem.settings.steps_per_period);
+  return shoot_at(search, finer, cycle.motion, cycle.period);
 }
 
 std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)

@@ -35,7 +35,7 @@ struct ReducedCycle
 /// Returns why there is none, or nothing.
 std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle);
 
-/// The reduced model's cycle at twice as many steps gives the step's errors. Further ones are unknown, NaN.
-void estimate_reduced_step_errors(ReducedSearch& search, const ReducedCycle& cycle);
+/// The reduced model's cycle at twice as many steps a period.
+ReducedCycle cycle_at_twice_the_steps(ReducedSearch& search, const ReducedCycle& cycle);
 
 } // namespace squeal

@@ -1,8 +1,4 @@
 #include "squeal/shooting/orbit.hpp"
-#include "beside_orbit.hpp"
-#include "squeal/base/cost.hpp"
-#include "squeal/base/run_control.hpp"
-#include "squeal/shooting/shooting.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -47,11 +43,6 @@ void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, PetscI
   log.progress.update(log.done.value_or(static_cast<double>(convergence.periods)),
                       format("%s, %ld periods, T %.6g s, residual %.1e", word(stage), convergence.periods, orbit.period,
                              orbit.residual));
-}
-
-void record_full(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit)
-{
-  record(log, stage, orbit, 2 * dofs_of(orbit.state) + 1, std::nan(""));
 }
 
 bool admissible_period(const OrbitProblem& problem, double period)
@@ -106,7 +97,7 @@ Orbit integrate_free_periods(const OrbitProblem& problem, ConvergenceLog& log, V
   for (int done = 0; done < (asked.periods > 0 ? at_most : 0); ++done)
   {
     const Orbit orbit = evaluate(problem, log, current, period);
-    record(log, ShootingStage::free_periods, orbit, 0, std::nan(""));
+    record(log, ShootingStage::free_periods, orbit, 0);
     log.slips.push_back(orbit.offsets.slip);
     check(VecAXPY(current, 1, orbit.defect));
     // A new period costs a factorisation, so a small correction waits for the last one.
@@ -126,93 +117,10 @@ Orbit integrate_free_periods(const OrbitProblem& problem, ConvergenceLog& log, V
     const double correction = nearest_recurrence(problem, orbit);
     if (!(std::abs(correction) > asked.refactored * period) || !admissible_period(problem, period + correction)) break;
     period += correction;
-    record(log, ShootingStage::free_periods, orbit, 0, std::nan(""));
+    record(log, ShootingStage::free_periods, orbit, 0);
     orbit = evaluate(problem, log, current, period);
   }
   return orbit;
-}
-
-namespace
-{
-
-/// The number of periods over which motions beside the orbit are watched: as many as are asked for. Else as many as
-/// make a motion by the tangent four times as large, where the verdict is not "stable" and these are few. Of a whole
-/// matrix that says "stable" as many as show a decay, since a contact that touches and leaves within two steps
-/// forgets when it did; where only the bar of one of its multipliers leaves it open, as many as are affordable or as
-/// the search took.
-long watched_periods(const OrbitProblem& problem, const ShootingOptions& options, const ConvergenceLog& log,
-                     const Multipliers& multipliers)
-{
-  constexpr double enough = 200;                             // a growth of 1e-3 a period shows
-  const long at_most = is_dear(problem.flow.work) ? 20 : 80; // periods
-  if (options.watched_periods >= 0) return options.watched_periods;
-  if (multipliers.values.empty()) return 0;
-  constexpr double to_see_it_decay = 32;
-  const double affordable = affordable_work / problem.flow.work;
-  const bool whole =
-      multipliers.method == MultiplierMethod::whole; // a projection's bar is the grid's, of a motion as well
-  if (multipliers.stability == Stability::stable)
-    return whole ? static_cast<long>(std::min(affordable, to_see_it_decay)) : 0;
-  const long searched = log.convergence.periods;
-  const double largest = std::abs(multipliers.values[deciding_place(multipliers)]);
-  long periods = 0;
-  if (largest > 1 && std::log(4) <= static_cast<double>(at_most) * std::log(largest) &&
-      searched + at_most <= options.max_periods)
-    periods = at_most;
-  const bool by_bar = is_left_open_by_one(multipliers) && largest_reaches_across(multipliers);
-  if (by_bar && whole)
-    periods =
-        std::max(periods, static_cast<long>(std::min(enough, std::max(affordable, static_cast<double>(searched)))));
-  return periods;
-}
-
-} // namespace
-
-Verdict judge(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, const Orbit& orbit)
-{
-  Verdict verdict;
-  Multipliers& multipliers = verdict.floquet.multipliers;
-  const char* sought = "its multipliers were sought";
-  try
-  {
-    verdict.floquet = find_multipliers(problem, options, orbit);
-    multipliers.offsets = orbit.offsets.held;
-    sought = "a motion beside it was watched";
-    const long periods = watched_periods(problem, options, log, multipliers);
-    if (periods == 0) return verdict;
-    multipliers.seen = growths_beside(problem, log, orbit, verdict.floquet, periods);
-    const bool decided = multipliers.stability != Stability::undecided;
-    decide_by_growth(multipliers.seen, multipliers);
-    verdict.doubted = decided && multipliers.stability == Stability::undecided &&
-                      multipliers.seen.back().growth + multipliers.seen.back().error > 1;
-  }
-  catch (const Interrupted&) // on all ranks alike: the orbit stays
-  {
-    verdict.cut_short = true;
-    multipliers.stability = Stability::undecided;
-    multipliers.would_decide = std::string("the run was ended while ") + sought;
-  }
-  return verdict;
-}
-
-void refuse_repelling(const Verdict& verdict, std::size_t other_unstable, Outcome& outcome)
-{
-  if (outcome.kind != OutcomeKind::converged) return;
-  const Multipliers& multipliers = verdict.floquet.multipliers;
-  if (multipliers.stability == Stability::unstable)
-  {
-    outcome.kind = other_unstable == 0 ? OutcomeKind::unstable_cycle : OutcomeKind::not_periodic;
-    const bool as_seen = largest_reaches_across(multipliers) && !multipliers.seen.empty();
-    outcome.reason = format("the cycle found repels: a small motion beside it grows %.4g times a period (%s)",
-                            as_seen ? multipliers.seen.back().growth : std::abs(multipliers.values.front()),
-                            word(multipliers.crossing));
-    if (other_unstable > 0) outcome.reason += format("; %zu modes are unstable", other_unstable + 1);
-  }
-  else if (verdict.doubted)
-  {
-    outcome.kind = OutcomeKind::unstable_cycle;
-    outcome.reason = "whether the cycle found repels is undecided: " + multipliers.would_decide;
-  }
 }
 
 } // namespace squeal

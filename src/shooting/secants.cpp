@@ -315,7 +315,7 @@ StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& optio
     check(VecAXPY(moved, 1, step.state));
     Orbit next = evaluate(problem, log, moved, orbit.period + step.period);
     ++log.convergence.iterations;
-    record_full(log, ShootingStage::multisecant, next);
+    record(log, ShootingStage::multisecant, next, 2 * dofs_of(next.state) + 1);
     const bool slips = slips_one_way(problem, next);
     if (slips) next = integrate_free_periods(problem, log, next.state, next.period, {1, 0, options.free_periods});
     if (collapsing(problem, next) || !std::isfinite(next.residual))

@@ -1,6 +1,5 @@
 // Multipliers by oblique projection against the whole monodromy matrix, on random frictional oscillators.
 // ranks: 1 2
-#include "../../src/shooting/beside_orbit.hpp"
 #include "../support/cycle_of.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 

@@ -24,21 +24,6 @@ struct MotionShapes
   double left_out = 0;                          // part of the kinetic energy that the shapes miss
 };
 
-/// No sample yet; vectors are distributed as the columns of M.
-MotionShapes no_shapes(Mat M);
-
-/// The number of steps between samples. It is a divisor of `steps`, the largest one by which samples are not slower
-/// than 96 kHz, nearly five times what is heard.
-int steps_between_samples(int steps, double step_size);
-
-/// Appends a sample. V gains a shape where it misses 2e-3 of the largest velocity seen, up to `most` shapes.
-/// Collective.
-void add_sample(MotionShapes& motion, Mat M, Vec v, Vec Mv, PetscInt most);
-
-/// Turns the shapes to the principal axes of the samples from `first` on, the strongest first. Those of least energy go
-/// that hold 1e-6 of it together. Collective.
-void keep_strongest(MotionShapes& motion, std::size_t first);
-
 // The settled motion of the brake where no cycle attracts (src/README.md, section 7.10).
 
 /// outcome: "settled"; "not converged" where the motion never became stationary or its kind is undecided; "skipped"

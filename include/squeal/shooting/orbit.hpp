@@ -109,11 +109,10 @@ struct StageResult
 /// One evaluation of the flow. Error: as of the flow.
 Orbit evaluate(const OrbitProblem& problem, ConvergenceLog& log, Vec state, double period);
 
-/// Adds a record. `unknowns`: of the stage's system; 0 where nothing is solved for.
-void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, PetscInt unknowns, double residual_projected);
-
-/// The same for a stage whose unknowns are u, v and T.
-void record_full(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit);
+/// Adds a record. `unknowns`: of the stage's system; 0 where nothing is solved for. The projected residual is NaN in
+/// the full space.
+void record(ConvergenceLog& log, ShootingStage stage, const Orbit& orbit, PetscInt unknowns,
+            double residual_projected = std::numeric_limits<double>::quiet_NaN());
 
 /// Whether T is within a factor of two of the first period.
 bool admissible_period(const OrbitProblem& problem, double period);

@@ -21,6 +21,16 @@ struct Verdict
 /// meanwhile, the verdict is cut short. Error: as of the flow.
 Verdict judge(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, const Orbit& orbit);
 
+/// A state displaced from the orbit by a part of its fluctuation along its fastest motion. `part`: positive towards
+/// less energy.
+Owned<Vec> state_beside(const OrbitProblem& problem, const Orbit& orbit, Vec fastest, double part);
+
+/// Decides what is undecided where a motion was seen to grow beyond its own bar, and what only the bar of one
+/// multiplier leaves undecided where it was seen to decay. "Stable" is undecided where one was not seen to decay, and
+/// "unstable" where it was not: where contact only just opens, closes or sticks, the tangent holds in a neighbourhood
+/// that no motion stays in. Not collective.
+void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers);
+
 /// An orbit that repels is no answer; with other unstable modes the motion need not be periodic at all. Not collective.
 void refuse_repelling(const Verdict& verdict, std::size_t other_unstable, Outcome& outcome);
 

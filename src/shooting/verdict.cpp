@@ -1,5 +1,7 @@
-#include "beside_orbit.hpp"
 #include "monodromy.hpp"
+#include "squeal/base/cost.hpp"
+#include "squeal/base/run_control.hpp"
+#include "squeal/shooting/shooting.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -132,8 +134,7 @@ SeenGrowth growth_of(const BesideMotion& motion, std::vector<double> distances, 
   return seen;
 }
 
-} // namespace
-
+/// Whether the bar of the deciding multiplier, or of its conjugate, alone leaves the verdict open. Not collective.
 bool is_left_open_by_one(const Multipliers& multipliers)
 {
   if (multipliers.stability != Stability::undecided || !multipliers.complete) return false;
@@ -145,15 +146,8 @@ bool is_left_open_by_one(const Multipliers& multipliers)
   return true;
 }
 
-Owned<Vec> state_beside(const OrbitProblem& problem, const Orbit& orbit, Vec fastest, double part)
-{
-  const Owned<Vec> fluctuation = fluctuation_of(problem, orbit);
-  const double outwards = energy_product(problem.flow, fluctuation, fastest) > 0 ? 1 : -1;
-  Owned<Vec> state = copy_of(orbit.state.get());
-  check(VecAXPY(state, -part * outwards * orbit.fluctuation, fastest));
-  return state;
-}
-
+/// What the distance of a motion from the orbit grows by, from smaller and smaller parts of the fluctuation until that
+/// is what the deciding multiplier says; of an unstable orbit from one part alone. The largest part comes first.
 std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
                                        const FloquetAnalysis& floquet, long periods)
 {
@@ -181,6 +175,48 @@ std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceL
     if (part < 100 * orbit.residual) break; // no part that the orbit's own error does not hide
   }
   return seen;
+}
+
+/// The number of periods over which motions beside the orbit are watched: as many as are asked for. Else as many as
+/// make a motion by the tangent four times as large, where the verdict is not "stable" and these are few. Of a whole
+/// matrix that says "stable" as many as show a decay, since a contact that touches and leaves within two steps
+/// forgets when it did; where only the bar of one of its multipliers leaves it open, as many as are affordable or as
+/// the search took.
+long watched_periods(const OrbitProblem& problem, const ShootingOptions& options, const ConvergenceLog& log,
+                     const Multipliers& multipliers)
+{
+  constexpr double enough = 200;                             // a growth of 1e-3 a period shows
+  const long at_most = is_dear(problem.flow.work) ? 20 : 80; // periods
+  if (options.watched_periods >= 0) return options.watched_periods;
+  if (multipliers.values.empty()) return 0;
+  constexpr double to_see_it_decay = 32;
+  const double affordable = affordable_work / problem.flow.work;
+  const bool whole =
+      multipliers.method == MultiplierMethod::whole; // a projection's bar is the grid's, of a motion as well
+  if (multipliers.stability == Stability::stable)
+    return whole ? static_cast<long>(std::min(affordable, to_see_it_decay)) : 0;
+  const long searched = log.convergence.periods;
+  const double largest = std::abs(multipliers.values[deciding_place(multipliers)]);
+  long periods = 0;
+  if (largest > 1 && std::log(4) <= static_cast<double>(at_most) * std::log(largest) &&
+      searched + at_most <= options.max_periods)
+    periods = at_most;
+  const bool by_bar = is_left_open_by_one(multipliers) && largest_reaches_across(multipliers);
+  if (by_bar && whole)
+    periods =
+        std::max(periods, static_cast<long>(std::min(enough, std::max(affordable, static_cast<double>(searched)))));
+  return periods;
+}
+
+} // namespace
+
+Owned<Vec> state_beside(const OrbitProblem& problem, const Orbit& orbit, Vec fastest, double part)
+{
+  const Owned<Vec> fluctuation = fluctuation_of(problem, orbit);
+  const double outwards = energy_product(problem.flow, fluctuation, fastest) > 0 ? 1 : -1;
+  Owned<Vec> state = copy_of(orbit.state.get());
+  check(VecAXPY(state, -part * outwards * orbit.fluctuation, fastest));
+  return state;
 }
 
 void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers)
@@ -224,6 +260,53 @@ void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipli
   multipliers.stability = grows ? Stability::unstable : Stability::stable;
   if (grows) multipliers.crossing = crossing_of(followed);
   multipliers.would_decide.clear();
+}
+
+Verdict judge(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, const Orbit& orbit)
+{
+  Verdict verdict;
+  Multipliers& multipliers = verdict.floquet.multipliers;
+  const char* sought = "its multipliers were sought";
+  try
+  {
+    verdict.floquet = find_multipliers(problem, options, orbit);
+    multipliers.offsets = orbit.offsets.held;
+    sought = "a motion beside it was watched";
+    const long periods = watched_periods(problem, options, log, multipliers);
+    if (periods == 0) return verdict;
+    multipliers.seen = growths_beside(problem, log, orbit, verdict.floquet, periods);
+    const bool decided = multipliers.stability != Stability::undecided;
+    decide_by_growth(multipliers.seen, multipliers);
+    verdict.doubted = decided && multipliers.stability == Stability::undecided &&
+                      multipliers.seen.back().growth + multipliers.seen.back().error > 1;
+  }
+  catch (const Interrupted&) // on all ranks alike: the orbit stays
+  {
+    verdict.cut_short = true;
+    multipliers.stability = Stability::undecided;
+    multipliers.would_decide = std::string("the run was ended while ") + sought;
+  }
+  return verdict;
+}
+
+void refuse_repelling(const Verdict& verdict, std::size_t other_unstable, Outcome& outcome)
+{
+  if (outcome.kind != OutcomeKind::converged) return;
+  const Multipliers& multipliers = verdict.floquet.multipliers;
+  if (multipliers.stability == Stability::unstable)
+  {
+    outcome.kind = other_unstable == 0 ? OutcomeKind::unstable_cycle : OutcomeKind::not_periodic;
+    const bool as_seen = largest_reaches_across(multipliers) && !multipliers.seen.empty();
+    outcome.reason = format("the cycle found repels: a small motion beside it grows %.4g times a period (%s)",
+                            as_seen ? multipliers.seen.back().growth : std::abs(multipliers.values.front()),
+                            word(multipliers.crossing));
+    if (other_unstable > 0) outcome.reason += format("; %zu modes are unstable", other_unstable + 1);
+  }
+  else if (verdict.doubted)
+  {
+    outcome.kind = OutcomeKind::unstable_cycle;
+    outcome.reason = "whether the cycle found repels is undecided: " + multipliers.would_decide;
+  }
 }
 
 } // namespace squeal
