@@ -126,8 +126,20 @@ private:
     return state_of(equilibrium().u, at_rest);
   }
 
-  /// column = dPhi_period(start)/dparameter, by a central difference.
+  /// column = dPhi_period(start)/dparameter: exact by friction, else by a central difference.
   void parameter_column(double period, Vec start, Vec column)
+  {
+    if (!friction_) return difference_column(period, start, column);
+    at_->flow.record_period(period, start, {});
+    const Vec load = at_->model.structure.load;
+    TangentColumn change{zeros_like(load), zeros_like(load), 1};
+    PeriodMap& map = at_->map;
+    advance_tangents(map.step, map.sliding.structure, map.sliding.interface, map.records, std::span(&change, 1));
+    check(VecCopy(change.u, displacement(column)));
+    check(VecCopy(change.v, velocity(column)));
+  }
+
+  void difference_column(double period, Vec start, Vec column)
   {
     // 1e-5 of the range: the contact's tolerance of 1e-10 is then below 1e-4 of the quotient
     const double parameter = at_->parameter, change = 1e-5 * std::abs(problem_.settings.to - problem_.settings.from);

@@ -47,11 +47,14 @@ void LinearContact::set_unknowns(const ContactLaw& law, const StepRecord& record
       for (Index k = 0; k < directions; ++k) leading_.push_back(rows.tangential(own) + k);
       continue;
     }
-    const FrictionCoefficient mu = friction_coefficient(in_step.of(pair), speed);
+    const FrictionLaw& of_pair = in_step.of(pair);
+    const FrictionCoefficient mu = friction_coefficient(of_pair, speed);
     const VectorXd e = w / speed;
     PairMatrix turn = e;
     if (directions == 2) turn = (PairMatrix(2, 2) << e(0), -e(1), e(1), e(0)).finished();
     slips_.push_back({rows.tangential(own), static_cast<Index>(leading_.size()) - 1, turn, mu.value});
+    if (!in_step.has_own(pair))
+      by_coefficient_.segment(rows.tangential(own), directions) = -reaction * share_of_coefficient(of_pair, speed) * e;
     if (first_turned_ == 0) S.push_back(mu.derivative * reaction);
     if (directions == 2) S.push_back(mu.value * reaction / speed);
   }
@@ -59,7 +62,7 @@ void LinearContact::set_unknowns(const ContactLaw& law, const StepRecord& record
 }
 
 LinearContact::LinearContact(const Eigen::Ref<const MatrixXd>& W, const ContactLaw& law, const StepRecord& record)
-    : rows_(W.rows())
+    : by_coefficient_(VectorXd::Zero(W.rows()))
 {
   set_unknowns(law, record);
   const auto leading = static_cast<Index>(leading_.size());
@@ -180,7 +183,7 @@ MatrixXd LinearContact::solve_transposed(const MatrixXd& right) const
 
 MatrixXd LinearContact::reactions(const MatrixXd& x) const
 {
-  MatrixXd result = MatrixXd::Zero(rows_, x.cols());
+  MatrixXd result = MatrixXd::Zero(by_coefficient_.size(), x.cols());
   for (std::size_t i = 0; i < leading_.size(); ++i) result.row(leading_[i]) = x.row(static_cast<Index>(i));
   auto at = static_cast<Index>(leading_.size());
   for (const Slip& slip : slips_)

@@ -21,6 +21,7 @@ namespace
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 constexpr std::size_t at_once = 64; // columns: their work vectors take ten times a column's memory
 
@@ -119,7 +120,8 @@ std::shared_ptr<const LinearContact> contact_of_step(const RecordedStep& of, con
 }
 
 /// dr of every column, on every rank. `Bv_free`: B dv_f of each, on rank 0.
-MatrixXd reactions(const RecordedStep& of, MatrixXd db, const std::vector<double>& Bv_free)
+MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> columns, MatrixXd db,
+                   const std::vector<double>& Bv_free)
 {
   const auto& [step, structure, interface, record, entries, room] = of;
   MatrixXd dr = MatrixXd::Zero(db.rows(), db.cols());
@@ -129,7 +131,11 @@ MatrixXd reactions(const RecordedStep& of, MatrixXd db, const std::vector<double
     const auto contact = contact_of_step(of, W);
     if (contact->is_open()) return;
     db += MatrixXd::Map(Bv_free.data(), db.rows(), db.cols());
-    dr = contact->reactions(contact->solve(contact->rows_of(db)));
+    Eigen::RowVectorXd dmu(db.cols());
+    for (Index k = 0; k < dmu.size(); ++k) dmu(k) = columns[static_cast<std::size_t>(k)].friction;
+    const VectorXd& of_coefficient = contact->by_coefficient();
+    if (!dmu.isZero(0)) db += W * of_coefficient * dmu;
+    dr = contact->reactions(contact->solve(contact->rows_of(db))) + of_coefficient * dmu;
   };
   on_rank_zero(comm_of(interface.B), find);
   MPI_Bcast(dr.data(), to_int(dr.size()), MPI_DOUBLE, 0, comm_of(interface.B));
@@ -146,7 +152,7 @@ void solve_columns(const RecordedStep& of, std::span<const TangentColumn> column
   std::vector<double> lambda;
   if (interface.pairs > 0)
   {
-    dr = step.h * reactions(of, std::move(db), Bv_free);
+    dr = step.h * reactions(of, columns, std::move(db), Bv_free);
     for (std::size_t k = 0; k < columns.size(); ++k)
     {
       const double* const impulse = dr.col(static_cast<Index>(k)).data();

@@ -78,6 +78,10 @@ TEST_CASE("the derivatives of sliding friction are those of r_t = -mu r_n s/|s|"
     }
     const std::array<double, 2> rest = {0, 0};
     CHECK(sliding_friction(law, r_n, rest).damping[0][0] == 0);
+    FrictionLaw higher = law, lower = law;
+    higher.coefficient += d, lower.coefficient -= d;
+    const double more = friction_coefficient(higher, 1).value, less = friction_coefficient(lower, 1).value;
+    CHECK(std::abs((more - less) / (2 * d) - share_of_coefficient(law, 1)) < 1e-9);
   }
 }
 

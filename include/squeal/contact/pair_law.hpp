@@ -176,6 +176,12 @@ inline FrictionCoefficient friction_coefficient(const FrictionLaw& law, double s
   return {law.coefficient + excess, -excess / law.decay_speed};
 }
 
+/// The derivative of mu(speed) in law.coefficient.
+inline double share_of_coefficient(const FrictionLaw& law, double speed)
+{
+  return law.decay_speed == 0 ? factor_at(law.factor_at_speed, speed) : 1 - std::exp(-speed / law.decay_speed);
+}
+
 /// The steepest fall of mu(speed) [s/m]; 0 where mu does not fall, or at once from rest.
 inline double steepest_fall(const FrictionLaw& law)
 {

@@ -1,7 +1,7 @@
 #pragma once
 /// Contact of one step, linearised at its solution (src/README.md, section 4.13): dr for changes db of w = W r + b,
 ///     dw = W dr + db;   open: dr = 0;   closed: dw_n = 0
-///     stick: dw_t = 0;  slip: dr_t + mu e dr_n + S dw_t = 0,   e = w_t/|w_t|,
+///     stick: dw_t = 0;  slip: dr_t + mu e dr_n + S dw_t = -r_n e dmu,   e = w_t/|w_t|,
 ///     S = mu r_n/|w_t| (1 - e e') + mu' r_n e e'.
 ///
 /// S is diagonal in the directions along e and across it. Normal rows and those of stick are the leading unknowns; dr_n
@@ -45,6 +45,9 @@ public:
   /// dr = Q x
   Eigen::MatrixXd reactions(const Eigen::MatrixXd& x) const;
 
+  /// dr of a change 1 of the law's common coefficient where nothing moves: -r_n e dmu.
+  const Eigen::VectorXd& by_coefficient() const { return by_coefficient_; }
+
 private:
   using PairMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 2, 2>; // of tangential directions
 
@@ -68,9 +71,9 @@ private:
   std::vector<Slip> slips_;
   Eigen::Index first_turned_ = 0; // of the directions of `turn`: the first one that has an entry of y
   Eigen::VectorXd S_;             // [N s/m] the diagonal of S, by entries of y: pair by pair
-  Eigen::Index rows_ = 0;         // of W
-  Eigen::MatrixXd A_;             // its leading block as L U
-  Eigen::VectorXi order_;         // P of P A = L U of that block
+  Eigen::VectorXd by_coefficient_;
+  Eigen::MatrixXd A_;     // its leading block as L U
+  Eigen::VectorXi order_; // P of P A = L U of that block
 };
 
 } // namespace squeal

@@ -154,10 +154,11 @@ StepReport advance(const ThetaStep& step, const Structure& structure, const Inte
 //
 // Caveat: the step is piecewise smooth. The tangent does not see a change of the start that changes a status.
 
-/// A change of the state.
+/// A change of the state, and its cause besides the change of the start.
 struct TangentColumn
 {
-  Owned<Vec> u, v; // du [m], dv [m/s]
+  Owned<Vec> u, v;     // du [m], dv [m/s]
+  double friction = 0; // change of the friction law's coefficient in every step
 };
 
 /// The records of `steps` steps made in place. Collective. The state becomes that at their end.
