@@ -81,11 +81,8 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
 {
   const MPI_Comm comm = comm_of(A);
   Plan plan{options.kind, bordered(A, B), {}, 0};
-  Triplets pattern;
-  if (ranks_of(comm) > 1) pattern = gather(plan.entries, TripletContent::pattern, comm);
-  const Triplets& all = ranks_of(comm) > 1 ? pattern : plan.entries;
-  plan.symbolic = options.known ? options.known->analyse(all, rows_of(A), rows_of(B), comm)
-                                : analyse(all, rows_of(A), rows_of(B), comm);
+  const Triplets pattern = gather({plan.entries.row, plan.entries.column, {}}, comm);
+  plan.symbolic = analyse(pattern, rows_of(A), rows_of(B), comm, options.known.get());
   plan.memory = cholesky_memory(plan.symbolic);
   MPI_Bcast(&plan.memory, 1, MPI_DOUBLE, 0, comm);
   constexpr double gigabyte = 1e9;

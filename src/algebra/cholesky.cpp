@@ -1,6 +1,7 @@
 #include "cholesky.hpp"
 #include "front.hpp"
 #include "squeal/algebra/panel.hpp"
+#include "squeal/base/broadcast.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/free_memory.hpp"
 
@@ -371,14 +372,8 @@ void Cholesky::backward(const std::vector<double>& lambda, std::span<double* con
 {
   const SymbolicFactor& symbolic = share_.symbolic;
   const std::size_t dofs = at(symbolic.dofs), border = at(symbolic.border);
-  std::vector<double> of_rank_zero;
-  if (ranks_of(comm_) > 1)
-  {
-    of_rank_zero.resize(border * columns_);
-    if (rank_of(comm_) == 0) std::copy_n(lambda.begin(), of_rank_zero.size(), of_rank_zero.begin());
-    MPI_Bcast(of_rank_zero.data(), to_int(of_rank_zero.size()), MPI_DOUBLE, 0, comm_);
-  }
-  const std::vector<double>& forces = ranks_of(comm_) > 1 ? of_rank_zero : lambda;
+  std::vector<double> forces = lambda;
+  broadcast(forces, comm_);
   for (std::size_t i = 0; i < border; ++i)
     for (std::size_t k = 0; k < columns_; ++k) work_[(dofs + i) * lanes_ + k] = forces[k * border + i];
   if (share_.own < symbolic.supernodes.size()) subtract_shared_border();

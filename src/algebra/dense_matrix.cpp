@@ -190,20 +190,6 @@ template <class Matrix> Eigen::PartialPivLU<Matrix> regular_factor(const Matrix&
   return factor;
 }
 
-/// A^-T x
-MatrixXcd solve_transposed(const Eigen::PartialPivLU<MatrixXd>& A, const MatrixXcd& x)
-{
-  MatrixXcd result(x.rows(), x.cols());
-  result.real() = A.transpose().solve(x.real());
-  result.imag() = A.transpose().solve(x.imag());
-  return result;
-}
-
-MatrixXcd solve_transposed(const Eigen::PartialPivLU<MatrixXcd>& A, const MatrixXcd& x)
-{
-  return A.transpose().solve(x);
-}
-
 /// The pairs of a quadratic problem with Im(lambda) >= 0 and |lambda| <= limit, and the wanted vectors.
 ///
 /// With lambda = omega nu, nu = shift + 1/mu and Q = Q(shift) of the scaled matrices, Q mu^2 + (C + 2 shift M) mu + M
@@ -221,9 +207,9 @@ template <class Matrix> std::vector<TwoSidedPair> solve_companion(const Matrix& 
   const double omega = all ? largest : limit;
   const double shift = all ? 1e-2 : 0.2; // of nu: any that is no eigenvalue
   const Matrix m = omega * omega / stiffness * M, c = omega / stiffness * C, k = K / stiffness;
+  const Matrix Q = k + shift * (c + shift * m);
   const auto factor =
-      regular_factor(Matrix(k + shift * (c + shift * m)),
-                     "the quadratic eigenproblem is singular: some motion has neither mass nor stiffness");
+      regular_factor(Q, "the quadratic eigenproblem is singular: some motion has neither mass nor stiffness");
   Matrix A = Matrix::Zero(2 * n, 2 * n);
   A.topLeftCorner(n, n) = factor.solve(-c - 2 * shift * m);
   A.topRightCorner(n, n) = factor.solve(-m);
@@ -234,7 +220,11 @@ template <class Matrix> std::vector<TwoSidedPair> solve_companion(const Matrix& 
     if (mu(j).imag() <= 0 && std::abs(mu(j)) >= 1e-12 && !(omega * std::abs(shift + 1.0 / mu(j)) > limit))
       chosen.push_back(j);
   MatrixXcd chi;
-  if (left.cols() > 0) chi = solve_transposed(factor, left(Eigen::seqN(0, n), chosen).conjugate());
+  if (left.cols() > 0)
+    chi = MatrixXcd(Q.template cast<Complex>())
+              .transpose()
+              .partialPivLu()
+              .solve(left(Eigen::seqN(0, n), chosen).conjugate());
   for (Index place = 0; const Index j : chosen)
   {
     TwoSidedPair& pair = result.emplace_back();

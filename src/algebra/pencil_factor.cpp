@@ -4,7 +4,7 @@
 /// A factor of moderate size is made whole by every rank, each of which solves its part of the right-hand sides. Shared
 /// by ranks, MUMPS adds up in the order in which messages arrive: results would change in rounding from run to run, and
 /// a restarted run would not give the straight run's numbers. A larger factor is shared, with the right-hand sides and
-/// solutions where their rows are.
+/// solutions on rank 0.
 #include "squeal/algebra/shift_invert.hpp"
 
 #include "squeal/base/broadcast.hpp"
@@ -16,8 +16,6 @@
 #include <algorithm>
 #include <dmumps_c.h>
 #include <iterator>
-#include <numeric>
-#include <petscsf.h>
 #include <string>
 
 namespace squeal
@@ -179,7 +177,7 @@ void use_files(DMUMPS_STRUC_C& mumps)
 /// The entries of all ranks on every rank.
 Triplets everywhere(Triplets entries, MPI_Comm comm)
 {
-  Triplets all = gather(std::move(entries), TripletContent::values, comm);
+  Triplets all = gather(std::move(entries), comm);
   broadcast(all.row, comm);
   broadcast(all.column, comm);
   broadcast(all.value, comm);
@@ -208,31 +206,13 @@ std::pair<Triplets, std::vector<double>> on_common_pattern(const Triplets& K, co
   return both;
 }
 
-/// Sends each row of a solution, at places counted from one, to its owner.
-void bring_to_owners(const std::vector<MUMPS_INT>& places, const Eigen::MatrixXd& solution, MPI_Comm comm,
-                     Eigen::MatrixXd& rows)
-{
-  std::vector<PetscInt> from_zero;
-  for (const MUMPS_INT place : places) from_zero.push_back(place - 1);
-  PetscLayout layout = nullptr;
-  Owned<PetscSF> exchange;
-  check(PetscLayoutCreateFromSizes(comm, static_cast<PetscInt>(rows.rows()), PETSC_DECIDE, 1, &layout));
-  check(PetscSFCreate(comm, exchange.put()));
-  check(PetscSFSetGraphLayout(exchange, layout, static_cast<PetscInt>(from_zero.size()), nullptr, PETSC_COPY_VALUES,
-                              from_zero.data()));
-  check(PetscLayoutDestroy(&layout));
-  for (Eigen::Index j = 0; j < solution.cols(); ++j)
-  {
-    check(PetscSFReduceBegin(exchange, MPI_DOUBLE, solution.col(j).data(), rows.col(j).data(), MPI_REPLACE));
-    check(PetscSFReduceEnd(exchange, MPI_DOUBLE, solution.col(j).data(), rows.col(j).data(), MPI_REPLACE));
-  }
-}
-
 } // namespace
 
 EliminationOrder elimination_order(Mat K)
 {
-  const Triplets pattern = gather(lower_triangle(K), TripletContent::pattern, comm_of(K));
+  Triplets pattern = lower_triangle(K);
+  pattern.value.clear();
+  pattern = gather(std::move(pattern), comm_of(K));
   EliminationOrder order;
   const SymbolicFactor symbolic = analyse(pattern, row_layout(K).total(), 0, comm_of(K));
   for (const int position : symbolic.position) order.position.push_back(position + 1);
@@ -321,25 +301,19 @@ MultiVector PencilFactor::solve(const MultiVector& X) const
   Parts& parts = *parts_;
   MultiVector Y = X;
   if (X.columns() == 0) return Y;
-  control(parts.mumps, 27) = to_int(X.columns()); // all of them at each reading of the factor
-  parts.whole || ranks_of(parts.comm) == 1 ? solve_by_columns(parts, Y) : solve_by_rows(parts, Y);
-  return Y;
-}
-
-/// Each rank solves some of the columns, with its own factor.
-void PencilFactor::solve_by_columns(Parts& parts, MultiVector& Y)
-{
-  const int rows = to_int(Y.entries.rows()), columns = to_int(Y.columns()), rank = rank_of(parts.comm),
-            ranks = ranks_of(parts.comm);
-  Eigen::MatrixXd right(parts.layout.total(), (columns - rank + ranks - 1) / ranks);
-  const auto whole = [&](int j) { return j % ranks == rank ? right.col(j / ranks).data() : nullptr; };
+  const int rows = to_int(Y.entries.rows()), columns = to_int(Y.columns()), rank = rank_of(parts.comm);
+  const int solvers = parts.whole ? ranks_of(parts.comm) : 1; // ranks that have right-hand sides, one after the other
+  const int taken = rank < solvers ? (columns - rank + solvers - 1) / solvers : 0;
+  Eigen::MatrixXd right(parts.layout.total(), taken);
+  const auto whole = [&](int j) { return j % solvers == rank ? right.col(j / solvers).data() : nullptr; };
   for (int j = 0; j < columns; ++j)
     MPI_Gatherv(Y.entries.col(j).data(), rows, MPI_DOUBLE, whole(j), parts.layout.counts.data(),
-                parts.layout.starts.data(), MPI_DOUBLE, j % ranks, parts.comm);
+                parts.layout.starts.data(), MPI_DOUBLE, j % solvers, parts.comm);
   DMUMPS_STRUC_C& mumps = parts.mumps;
   mumps.rhs = right.data();
-  mumps.nrhs = to_int(right.cols());
+  mumps.nrhs = parts.whole ? taken : columns;
   mumps.lrhs = parts.layout.total();
+  control(mumps, 27) = columns; // all of them at each reading of the factor
   parts.run_together(
       [&]
       {
@@ -347,32 +321,8 @@ void PencilFactor::solve_by_columns(Parts& parts, MultiVector& Y)
       });
   for (int j = 0; j < columns; ++j)
     MPI_Scatterv(whole(j), parts.layout.counts.data(), parts.layout.starts.data(), MPI_DOUBLE, Y.entries.col(j).data(),
-                 rows, MPI_DOUBLE, j % ranks, parts.comm);
-}
-
-/// All ranks solve all columns with the factor that they share. The solution comes in the rows that MUMPS chooses.
-void PencilFactor::solve_by_rows(Parts& parts, MultiVector& Y)
-{
-  DMUMPS_STRUC_C& mumps = parts.mumps;
-  const int columns = to_int(Y.columns()), first = parts.layout.starts[static_cast<std::size_t>(rank_of(parts.comm))];
-  std::vector<MUMPS_INT> own(static_cast<std::size_t>(Y.entries.rows()));
-  std::iota(own.begin(), own.end(), first + 1);
-  const int share = std::max<int>(1, mumps.info[22]); // INFO(23): rows of the solution that come to this rank
-  std::vector<MUMPS_INT> places(static_cast<std::size_t>(share), 0);
-  Eigen::MatrixXd solution(share, columns);
-  control(mumps, 20) = 10; // right-hand sides by rows,
-  control(mumps, 21) = 1;  // and solutions
-  mumps.nrhs = columns;
-  mumps.nloc_rhs = to_int(own.size());
-  mumps.lrhs_loc = std::max<MUMPS_INT>(1, mumps.nloc_rhs);
-  mumps.irhs_loc = own.data();
-  mumps.rhs_loc = Y.entries.data();
-  mumps.lsol_loc = share;
-  mumps.isol_loc = places.data();
-  mumps.sol_loc = solution.data();
-  run(mumps, Job::solve);
-  places.resize(static_cast<std::size_t>(mumps.info[22]));
-  bring_to_owners(places, solution, parts.comm, Y.entries);
+                 rows, MPI_DOUBLE, j % solvers, parts.comm);
+  return Y;
 }
 
 } // namespace squeal

@@ -325,52 +325,35 @@ SymbolicFactor analysis_of(const Triplets& lower, int dofs, int border)
   return result;
 }
 
-} // namespace
-
-SymbolicFactor analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm)
-{
-  SymbolicFactor result;
-  on_rank_zero(comm, [&] { result = analysis_of(lower, dofs, border); });
-  return result;
-}
-
-namespace
-{
-
-/// 128 bits of the entries' places and of the sizes.
-std::array<std::uint64_t, 2> hash_of(const Triplets& lower, int dofs, int border)
+/// Of the entries' places and of the sizes.
+std::uint64_t hash_of(const Triplets& lower, int dofs, int border)
 {
   const auto both = [](int a, int b)
   { return static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint64_t>(static_cast<unsigned>(b)); };
-  std::array<std::uint64_t, 2> hash{splitmix64(both(dofs, border)), lower.row.size()};
-  for (std::size_t k = 0; k < lower.row.size(); ++k)
-  {
-    const std::uint64_t place = both(lower.row[k], lower.column[k]);
-    hash[0] = splitmix64(hash[0] ^ place);
-    hash[1] = splitmix64(hash[1] + 3 * place);
-  }
+  std::uint64_t hash = splitmix64(both(dofs, border));
+  for (std::size_t k = 0; k < lower.row.size(); ++k) hash = splitmix64(hash ^ both(lower.row[k], lower.column[k]));
   return hash;
 }
 
 } // namespace
 
-SymbolicFactor KnownAnalyses::analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm)
+SymbolicFactor analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm, KnownAnalyses* known)
 {
   constexpr std::size_t most = 6; // a model with a motion has five: K and A with and without border, one reduced
-  const bool first = rank_of(comm) == 0;
-  const std::array<std::uint64_t, 2> pattern = first ? hash_of(lower, dofs, border) : std::array<std::uint64_t, 2>{};
-  const auto found =
-      std::find_if(known_.begin(), known_.end(), [&](const Known& known) { return known.pattern == pattern; });
-  int is_known = first && found != known_.end();
-  MPI_Bcast(&is_known, 1, MPI_INT, 0, comm);
-  if (is_known && first) std::rotate(known_.begin(), found, found + 1);
-  if (!is_known)
-  {
-    SymbolicFactor symbolic = squeal::analyse(lower, dofs, border, comm);
-    if (first) known_.push_front({pattern, std::move(symbolic)}); // others may be the first one of a group of ranks
-    if (known_.size() > most) known_.pop_back();
-  }
-  return first ? known_.front().symbolic : SymbolicFactor();
+  KnownAnalyses none;
+  auto& last = known ? known->last : none.last;
+  on_rank_zero(comm,
+               [&]
+               {
+                 const std::uint64_t pattern = hash_of(lower, dofs, border);
+                 const auto found = std::ranges::find(last, pattern, &decltype(none.last)::value_type::first);
+                 if (found == last.end())
+                   last.emplace_front(pattern, analysis_of(lower, dofs, border));
+                 else
+                   std::rotate(last.begin(), found, found + 1);
+                 if (last.size() > most) last.pop_back();
+               });
+  return rank_of(comm) == 0 ? last.front().second : SymbolicFactor();
 }
 
 } // namespace squeal

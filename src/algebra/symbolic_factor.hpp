@@ -44,24 +44,16 @@ struct SymbolicFactor
   double entries = 0;                // of the factor, without the zeros of packing
 };
 
-/// `lower`: the lower triangle of A and, from row dofs + 1 on, the border; read on rank 0, where the result is.
-/// Collective.
-SymbolicFactor analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm);
-
-/// The analyses of the last patterns. METIS takes as long as the factor itself where that is small.
+/// The analyses of the last patterns by their hashes, the last one first. METIS takes as long as the factor itself
+/// where that is small.
 class KnownAnalyses
 {
 public:
-  /// As above; entries in another order count as another pattern. The first rank of `comm` alone knows it again.
-  SymbolicFactor analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm);
-
-private:
-  struct Known
-  {
-    std::array<std::uint64_t, 2> pattern; // its hash: two of 128 bits are not alike by chance
-    SymbolicFactor symbolic;
-  };
-  std::deque<Known> known_; // the last one first
+  std::deque<std::pair<std::uint64_t, SymbolicFactor>> last{};
 };
+
+/// `lower`: the lower triangle of A and, from row dofs + 1 on, the border; read on rank 0, where the result is, and
+/// where a pattern that is known is found again. Entries in another order count as another pattern. Collective.
+SymbolicFactor analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm, KnownAnalyses* known = nullptr);
 
 } // namespace squeal

@@ -12,16 +12,14 @@ namespace
 /// average of the ranks.
 template <class Keep> void append(Mat matrix, PetscInt offset, Keep keep, double part, Triplets& entries)
 {
-  PetscInt rows = 0, columns = 0;
-  check(MatGetSize(matrix, &rows, &columns));
   MatInfo info;
   check(MatGetInfo(matrix, MAT_LOCAL, &info));
   const std::size_t expected = entries.row.size() + static_cast<std::size_t>(part * info.nz_used) + 1;
   entries.row.reserve(expected);
   entries.column.reserve(expected);
   entries.value.reserve(expected);
-  (void)to_int(offset + rows);
-  (void)to_int(columns);
+  (void)to_int(offset + row_count(matrix));
+  (void)to_int(column_count(matrix));
   for_each_row(matrix,
                [&](PetscInt i, std::span<const PetscInt> column, std::span<const PetscScalar> value)
                {
@@ -63,15 +61,14 @@ void append_rows(Mat B, PetscInt offset, Triplets& entries)
       B, offset, [](PetscInt, PetscInt) { return true; }, 1, entries);
 }
 
-Triplets gather(Triplets entries, TripletContent content, MPI_Comm comm)
+Triplets gather(Triplets entries, MPI_Comm comm)
 {
   if (ranks_of(comm) == 1) return entries;
   auto total = static_cast<long long>(entries.row.size());
   MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPI_LONG_LONG, MPI_SUM, comm);
   (void)to_int(total);
-  Triplets all{gather(entries.row, MPI_INT, comm), gather(entries.column, MPI_INT, comm), {}};
-  if (content == TripletContent::values) all.value = gather(entries.value, MPI_DOUBLE, comm);
-  return all;
+  return {gather(entries.row, MPI_INT, comm), gather(entries.column, MPI_INT, comm),
+          gather(entries.value, MPI_DOUBLE, comm)};
 }
 
 } // namespace squeal

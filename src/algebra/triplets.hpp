@@ -14,13 +14,6 @@ struct Triplets
   std::vector<double> value;
 };
 
-/// What a gather communicates.
-enum class TripletContent
-{
-  pattern, // rows and columns only
-  values,  // all three
-};
-
 /// This rank's share of the lower triangle, diagonal included.
 Triplets lower_triangle(Mat symmetric);
 
@@ -29,6 +22,6 @@ void append_rows(Mat B, PetscInt offset, Triplets& entries);
 
 /// The entries of all ranks on rank 0, none elsewhere. Collective. Throws Error on all ranks if there are more than
 /// MPI can gather.
-Triplets gather(Triplets entries, TripletContent content, MPI_Comm comm);
+Triplets gather(Triplets entries, MPI_Comm comm);
 
 } // namespace squeal

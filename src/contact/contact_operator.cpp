@@ -170,14 +170,14 @@ void ContactOperator::hold_whole() const
   const std::size_t rows = size();
   held_whole_ = true;
   on_rank_zero(shared_by_, [&] { whole_.resize(rows * rows); });
-  if (rank_of(shared_by_) != 0) return send(columns_, 0, shared_by_);
   const std::vector<std::size_t> shares = column_shares(rows, shared_by_);
-  std::vector<double> received;
   for (int rank = 0; rank < ranks_of(shared_by_); ++rank)
   {
-    if (rank > 0) receive(received, rank, shared_by_);
+    std::vector<double> part = columns_;
+    broadcast(part, shared_by_, rank);
+    if (rank_of(shared_by_) != 0) continue;
     const std::size_t first = shares[static_cast<std::size_t>(rank)];
-    const double* column = rank > 0 ? received.data() : columns_.data();
+    const double* column = part.data();
     for (std::size_t j = first; j < shares[static_cast<std::size_t>(rank) + 1]; ++j, column += rows - first)
       for (std::size_t i = j; i < rows; ++i) whole_[i * rows + j] = whole_[j * rows + i] = column[i - first];
   }

@@ -1,13 +1,16 @@
 #include "squeal/modes/modes.hpp"
+#include "squeal/base/checkpoint.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
+#include "squeal/equilibrium/state.hpp"
 #include "squeal/modes/passes.hpp"
 #include "squeal/modes/quadratic.hpp"
 #include "squeal/modes/real_modes.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <iterator>
 #include <limits>
 
@@ -30,11 +33,6 @@ constexpr double near_end = 0.98;       // of |lambda|: from there on pairs may 
 int inertia_below(const PairProblem& problem, double theta, const PencilOptions& options)
 {
   return inertia_at(theta, problem.M_z, problem.K_z, options, elimination_order(problem.K_z)).below;
-}
-
-PairSearch empty_search(double top)
-{
-  return {{{OutcomeKind::converged, "", 0, 0}}, top};
 }
 
 /// The pairs of a window by passes; without P, those on the span of the basis.
@@ -158,7 +156,7 @@ PairSearch search_pairs(const PairProblem& problem, ModesMethod method, double b
   const PetscInt n = row_count(problem.K_z);
   const double floor = std::sqrt(vibration_floor(norms_of(problem.sliding)));
   const bool by_slices = n > options.dense_limit && method != ModesMethod::toar && !problem.is_indefinite;
-  PairSearch search = empty_search(two_pi * band * (by_slices ? reach_of_count : 1));
+  PairSearch search{{{OutcomeKind::converged, "", 0, 0}}, two_pi * band * (by_slices ? reach_of_count : 1)};
   const auto find_real = [&]
   { search.omega = solve_real_modes_below(problem.M_z, problem.K_z, search.top / two_pi, options).omega; };
   if (by_slices)
@@ -380,6 +378,64 @@ Modes find_modes(const SlidingEquilibrium& sliding, const LinearisedSliding& lin
     modes.count.certified_by = Certificate::all_pairs, modes.count.expected = modes.count.found;
   drop_beyond_band(modes);
   assess(modes);
+  return modes;
+}
+
+namespace
+{
+
+constexpr const char* name_of_search = "modes";
+
+/// All but the vectors of the modes, of which the numbers alone are set.
+void describe_search(Checkpoint& checkpoint, Modes& modes)
+{
+  std::size_t found = modes.modes.size();
+  describe_all(checkpoint, found, modes.outcome, modes.method, modes.shapes, modes.band, modes.decays,
+               modes.beyond_band, modes.unstable_count, modes.beyond_inertia, modes.count.certified_by,
+               modes.count.frequency, modes.count.expected, modes.count.found, modes.count_check);
+  modes.modes.resize(found);
+}
+
+/// Hands each mode with the name of its checkpoint to `pass`: one checkpoint of all might not fit into the memory.
+template <class Pass> void for_each_mode(Modes& modes, const Structure& structure, const Pass& pass)
+{
+  const FileOrder order(structure);
+  std::size_t number = 0;
+  for (ComplexMode& mode : modes.modes)
+    pass(format("modes.%06zu", number++),
+         [&](Checkpoint& checkpoint)
+         {
+           describe_all(checkpoint, mode.lambda, mode.backward_error, mode.reactions);
+           order.describe(checkpoint, mode.real);
+           order.describe(checkpoint, mode.imaginary);
+         });
+}
+
+} // namespace
+
+void keep_modes(Modes& modes, const Structure& structure)
+{
+  const MPI_Comm comm = comm_of(structure.load);
+  for_each_mode(modes, structure,
+                [&](const std::string& name, const Description& describe) { keep(name, comm, describe); });
+  keep(name_of_search, comm, [&](Checkpoint& checkpoint) { describe_search(checkpoint, modes); }); // of all modes
+}
+
+std::optional<Modes> kept_modes(const Structure& structure)
+{
+  const MPI_Comm comm = comm_of(structure.load);
+  Modes modes;
+  if (!restore(name_of_search, comm, [&](Checkpoint& checkpoint) { describe_search(checkpoint, modes); })) return {};
+  for (ComplexMode& mode : modes.modes)
+  {
+    mode.real = zeros_like(structure.load);
+    mode.imaginary = zeros_like(structure.load);
+  }
+  bool all = true;
+  for_each_mode(modes, structure,
+                [&](const std::string& name, const Description& describe) { all &= restore(name, comm, describe); });
+  if (!all) return {};
+  if (rank_of(comm) == 0) std::printf("  of the checkpoint\n");
   return modes;
 }
 

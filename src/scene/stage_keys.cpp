@@ -9,6 +9,15 @@ namespace
 
 using enum Need;
 using enum Rule;
+using enum Effect;
+using Study::derive, Study::double_it, Study::derive_and_double;
+
+/// Of beams and connectors.
+SceneKey loss_factor_key(double& loss_factor)
+{
+  return {"loss_factor", &loss_factor, "-",   "eta of its stiffness K (1 + i eta), as of a [[part]]",
+          not_negative,  damping,      derive};
+}
 
 } // namespace
 
@@ -162,16 +171,6 @@ SceneKeys keys_of(UncertainNumber& u)
 
 // The keys of what joins bodies and of what moves them: couplings, connectors, beams, bolts, added masses, rotors.
 
-namespace
-{
-
-using enum Need;
-using enum Rule;
-using enum Effect;
-using Study::derive, Study::double_it, Study::derive_and_double;
-
-} // namespace
-
 SceneKeys keys_of(Axis& a)
 {
   return {
@@ -209,8 +208,7 @@ SceneKeys keys_of(Connector& c)
       {"stiffness", &c.stiffness, "N/m", "six of x y z rx ry rz, or the 36 of a symmetric matrix; rotations in N m",
        stiffness_and_mass, double_it},
       {"damping", &c.damping, "N s/m", "six or 36 constants, likewise; rotations in N m s", damping},
-      {"loss_factor", &c.loss_factor, "-", "eta of its stiffness K (1 + i eta), as of a [[part]]", not_negative,
-       damping, derive},
+      loss_factor_key(c.loss_factor),
   };
 }
 
@@ -233,8 +231,7 @@ SceneKeys keys_of(Beam& b)
        not_negative, stiffness_and_mass},
       {"axis_2", &b.axis_2, "-", "direction across the beam; any when absent", direction, stiffness_and_mass},
       {"elements", &b.elements, "-", "number of elements along it", positive},
-      {"loss_factor", &b.loss_factor, "-", "eta of its stiffness K (1 + i eta), as of a [[part]]", not_negative,
-       damping, derive},
+      loss_factor_key(b.loss_factor),
   };
 }
 

@@ -25,7 +25,6 @@ using Eigen::MatrixXd;
 
 constexpr double variance = 1. / 3;   // of the random vectors' entries, even in (-1, 1)
 constexpr double least_error = 1e-14; // backward error that no correction makes smaller
-constexpr std::size_t few = 16;       // frequencies whose residuals are estimated before those of all are
 constexpr double deep = 1e-4;         // part of the largest |H| at a frequency; below it errors are relative to this
 
 /// The forces of a side: at the driven probes, Y'p, those of right vectors; at the read ones, Z'p, those of left ones.
@@ -151,15 +150,6 @@ HarmonicScan scan(const ForcedPoint& forced, const std::vector<double>& omega, d
   return result;
 }
 
-/// Evenly spread frequencies, at most `most`.
-std::vector<double> thinned(const std::vector<double>& omega, std::size_t most)
-{
-  const std::size_t taken = std::min(most, omega.size());
-  std::vector<double> result;
-  for (std::size_t i = 0; i < taken; ++i) result.push_back(omega[i * omega.size() / taken]);
-  return result;
-}
-
 /// Corrects the basis by the residual of each force at the frequency where it is largest. Small ones are left out
 /// unless all are small. Returns whether they add anything.
 bool correct(ForcedPoint& forced, const std::vector<double>& omega, const HarmonicScan& found)
@@ -231,17 +221,12 @@ void solve(const ResponseProblem& problem, ForcedPoint& forced, Response& respon
   {
     end_if_asked(comm);
     project(forced);
-    std::vector<double> at = thinned(omega, few);
-    found = scan(forced, at, tolerance);
-    if (is_small(found) && at.size() < omega.size()) found = scan(forced, at = omega, tolerance);
-    const bool small = is_small(found), whole = at.size() == omega.size();
-    bool ended = (small && before.size() > 0) || pass >= passes;
-    if (!ended && whole) before = found.receptance;
-    ended = ended || !correct(forced, at, found);
+    found = scan(forced, omega, tolerance);
+    bool ended = (is_small(found) && before.size() > 0) || pass >= passes;
+    if (!ended) before = found.receptance;
+    ended = ended || !correct(forced, omega, found);
     progress.update(pass, format("%d shapes", static_cast<int>(forced.size())));
-    if (!ended) continue;
-    if (!whole) found = scan(forced, omega, tolerance);
-    break;
+    if (ended) break;
   }
   if (before.size() > 0) response.change = largest_change(before, found.receptance, std::ssize(forced.forces[1].sizes));
   response.outcome.residual = means_of(found.residuals).maxCoeff();

@@ -3,7 +3,6 @@
 #include "squeal/study/sweep.hpp"
 
 #include "point_modes.hpp"
-#include "squeal/base/cost.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 #include "swept_model.hpp"
@@ -19,9 +18,10 @@ namespace squeal
 namespace
 {
 
-/// Backward errors where points are dear, and at those put in between: they leave eigenvalues within 3e-5, half of
-/// those of 33 224 degrees of freedom within 7e-8.
-constexpr double large_tolerance = 1e-6;
+/// Backward errors at points put in between, which tell which mode goes where, and where it changes its stability: they
+/// leave eigenvalues within 3e-5. Each is in a state of contact of its own, whose shapes would make the basis several
+/// times as large.
+constexpr double inserted_tolerance = 1e-6;
 constexpr double threshold_tolerance = 1e-5; // of the number's larger end
 constexpr std::size_t prepared = 16;         // design points whose closed pairs tell those of the basis
 constexpr int most_halvings = 6;             // of a step
@@ -76,7 +76,6 @@ private:
         end_if_asked(comm_);
         model_.prepare({values, line.reversed});
       }
-    if (model_.model()) tolerance_ = tolerance_on(model_.model()->structure);
   }
 
   void run_line(const SweepLine& line)
@@ -125,23 +124,10 @@ private:
     point.closed = static_cast<int>(std::ranges::count(at.closed, 1));
     point.modes.outcome = at.outcome;
     if (at.outcome.kind == OutcomeKind::converged && problem_.settings.stages == SweepStages::modes)
-      point.modes = model_.modes_at(point, tolerance_of(point));
+      point.modes = model_.modes_at(point, point.inserted ? inserted_tolerance : close_tolerance);
     if (point.modes.outcome.kind == OutcomeKind::converged) return true;
     point.modes.pairs.clear(); // of which some may be no modes
     return false;
-  }
-
-  static double tolerance_on(const Structure& structure)
-  {
-    constexpr double of_point = 3000; // products, for its modes
-    return of_point * work_of_step(structure) > affordable_work ? large_tolerance : close_tolerance;
-  }
-
-  /// Points put in between tell which mode goes where, and where it changes its stability. Each is in a state of
-  /// contact of its own, whose shapes would make the basis several times as large.
-  double tolerance_of(const Followed& point) const
-  {
-    return point.inserted ? std::max(tolerance_, large_tolerance) : tolerance_;
   }
 
   /// The first point of a line. In the other direction of rotation its modes take the tracks of those of the
@@ -370,7 +356,6 @@ private:
   SweptModel model_;
   Sweep sweep_;
   std::optional<Followed> first_{}; // point of all lines
-  double tolerance_ = close_tolerance;
   std::optional<Progress> progress_;
   std::size_t done_ = 0; // points
 };

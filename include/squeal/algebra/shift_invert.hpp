@@ -59,8 +59,6 @@ public:
 
 private:
   struct Parts;
-  static void solve_by_columns(Parts& parts, MultiVector& Y);
-  static void solve_by_rows(Parts& parts, MultiVector& Y);
   std::unique_ptr<Parts> parts_;
 };
 
