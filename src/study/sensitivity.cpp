@@ -152,8 +152,8 @@ public:
     equilibria_.expect(problem.sliding.equilibrium.closed);
   }
 
-  /// By a central difference, or to one side where that moves an eigenvalue by so little that it drowns in rounding, as
-  /// by a loss factor of 1e-6.
+  /// By a central difference. Where that moves an eigenvalue by so little that it drowns in rounding, as by a loss
+  /// factor of 1e-6, by one of fourth order over a longer step.
   std::vector<NumberDerivative> by(const SceneNumber& number)
   {
     constexpr double short_step = 1e-4; // most numbers enter M, C and K linearly
@@ -163,6 +163,15 @@ public:
     const auto above = beside(number, step), below = beside(number, -step);
     if (!above || !below) return unknown(number);
     if (std::ranges::min(changes(*above)) >= clear) return quotients(number, step, {{0.5, *above}, {-0.5, *below}});
+    for (const double part : {1e-2, 1e-3})
+    {
+      const double longer = part * number.value;
+      if (const auto far_below = beside(number, -2 * longer), far_above = beside(number, 2 * longer);
+          far_below && far_above)
+        if (const auto lower = beside(number, -longer), upper = beside(number, longer); lower && upper)
+          return quotients(number, longer,
+                           {{2. / 3, *upper}, {-2. / 3, *lower}, {-1. / 12, *far_above}, {1. / 12, *far_below}});
+    }
     return by_one_side(number);
   }
 
