@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <Eigen/Cholesky>
+#include <random>
 
 namespace squeal
 {
@@ -26,6 +27,7 @@ constexpr double widest_band = 64;   // the same, as long as there are fewer tha
 constexpr std::size_t fewest = 20;   // real modes
 constexpr double waiting_share =
     0.02;                       // directions of corrections below this part of the largest wait for the next pass
+constexpr Index mixtures = 24;  // of the residuals of a side: more directions than that wait for the next pass
 constexpr int most_passes = 20; // corrections of the basis; the first one of a brake may need more than 8
 constexpr double spurious_mode = 1e-8; // backward error of what is no mode
 
@@ -55,6 +57,22 @@ PointMatrices matrices_at(const SlidingBasis& basis, const LinearisedPoint& poin
   at.kept = MatrixXd::Identity(basis.shapes(), basis.shapes()) - inner_products(of_shapes, of_shapes);
   at.empty = empty_part(at.kept);
   return at;
+}
+
+/// Static shapes of forces on eliminated pairs that the basis takes for open.
+void attach(ModesBasis& modes, const Interface& interface, const std::vector<int>& eliminated)
+{
+  std::vector<int> pairs;
+  for (const int pair : eliminated)
+    if (const auto i = static_cast<std::size_t>(pair); !modes.closed[i] && !modes.attached[i])
+    {
+      pairs.push_back(pair);
+      modes.attached[i] = 1;
+    }
+  if (pairs.empty()) return;
+  const MultiVector forces = dense_columns(transpose_of(rows_of(interface, pairs, RowsTaken::normal)));
+  const MultiVector responses = modes.pencil.factor->solve(product(modes.Z_transposed, forces));
+  extend(modes.basis, product(modes.contact.Z, responses));
 }
 
 /// The two-norms of the parts of vectors that are no pivots.
@@ -111,16 +129,31 @@ std::vector<double> backward_errors(const ModesBasis& modes, const PointMatrices
   return errors;
 }
 
-/// Appends to `residuals` the real and imaginary parts of those of some vectors, over their backward error's scale,
-/// with zeros at the pivots.
+/// Complex weights, alike on every rank: columns mix the rows' vectors at random. As many columns as rows or more would
+/// mix nothing: then they are the real and the imaginary part of each.
+MatrixXcd random_weights(Index rows, Index columns)
+{
+  constexpr Complex i{0, 1};
+  MatrixXcd weights = MatrixXcd::Zero(rows, std::min(2 * rows, columns));
+  if (2 * rows <= columns)
+    weights << MatrixXcd::Identity(rows, rows), -i * MatrixXcd::Identity(rows, rows);
+  else
+  {
+    std::mt19937_64 generator(1);
+    std::normal_distribution<double> normal;
+    for (Index k = 0; k < weights.size(); ++k) weights.data()[k] = {normal(generator), normal(generator)};
+  }
+  return weights;
+}
+
+/// Appends to `residuals` those of some vectors, over their backward error's scale, with zeros at the pivots. Of many,
+/// random mixtures of real and imaginary parts span the same leading directions.
 void append_residuals(const ModesBasis& modes, const LinearisedPoint& point, const std::vector<TwoSidedPair>& pairs,
                       Side side, MultiVector& residuals)
 {
   if (pairs.empty()) return;
   Eigen::VectorXcd lambda(static_cast<Index>(pairs.size()));
-  const MatrixXcd one = MatrixXcd::Identity(lambda.size(), lambda.size());
-  MatrixXcd weights(lambda.size(), 2 * lambda.size());
-  weights << one, Complex(0, -1) * one;
+  MatrixXcd weights = random_weights(lambda.size(), mixtures);
   for (Index k = 0; k < lambda.size(); ++k)
   {
     lambda(k) = pairs[static_cast<std::size_t>(k)].lambda;
@@ -239,6 +272,7 @@ void rebase(ModesBasis& modes, const BasisProblem& problem, const std::vector<ch
   const Structure& structure = problem.structure;
   set_model(modes.basis, structure, problem.interface);
   modes.closed = closed;
+  modes.attached.assign(closed.size(), 0);
   modes.contact = eliminate_closed_pairs(structure, problem.interface, closed);
   modes.M_z = project_symmetric(structure.M, modes.contact.Z);
   const Owned<Mat> springs = contact_stiffness(problem.interface, problem.closed, PairForces::normal);
@@ -261,6 +295,7 @@ PointModes find_point_modes(ModesBasis& modes, const PointProblem& problem)
 {
   set_model(modes.basis, problem.sliding.structure, problem.sliding.interface);
   const LinearisedPoint point = linearise_point(problem.sliding);
+  attach(modes, problem.sliding.interface, point.contact.pairs);
   const double end = two_pi * followed_band * problem.band;
   const Window window{vibration_floor(modes.norms), end * end};
   for (PetscInt pass = 0;; ++pass)

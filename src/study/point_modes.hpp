@@ -16,9 +16,10 @@ namespace squeal
 struct ModesBasis
 {
   SlidingBasis basis;
-  ClosedContact contact{};    // of the pairs that are closed and rigid at every point: without friction
-  std::vector<char> closed{}; // those pairs
-  Owned<Mat> M_z{}, K_z{};    // with the springs of pairs that have a compliance where the basis was made
+  std::vector<char> attached{}; // pairs beyond those closed at every point whose static shapes the basis holds
+  ClosedContact contact{};      // of the pairs that are closed and rigid at every point: without friction
+  std::vector<char> closed{};   // those pairs
+  Owned<Mat> M_z{}, K_z{};      // with the springs of pairs that have a compliance where the basis was made
   Owned<Mat> Z_transposed{};
   ShiftInvert pencil{};   // of K_z, M_z just below zero
   QuadraticNorms norms{}; // of M_z, C_z and K_z
