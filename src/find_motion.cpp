@@ -326,9 +326,19 @@ bool alike(const MeanValue& a, const MeanValue& b)
   return std::abs(a.value - b.value) <= a.error + b.error;
 }
 
-/// Whether more steps a period may change what the motion settled on: where "auto" chooses them and a settled motion
-/// at these is affordable, until a motion that settled on no cycle does as it did at the steps before. The grid of time
-/// alone can make a motion of impacts wander; it then diverges by the step, not by the period.
+/// Whether a cycle is known at its own steps alone, and whether motions settle there is not.
+bool is_open(const Motion& motion)
+{
+  const Fidelity& fidelity = motion.fidelity;
+  return succeeded(motion.cycle.outcome) && motion.cycle.multipliers.stability == Stability::undecided &&
+         std::max(fidelity.step_frequency_error, fidelity.step_energy_error) > fidelity.accuracy / 2;
+}
+
+constexpr int finest = 1024; // steps a period
+
+/// Whether more steps a period may change the answer: where "auto" chooses them and a settled motion at these is
+/// affordable, until a motion that settled on no cycle does as it did at the steps before. The grid of time alone can
+/// make a motion of impacts wander; it then diverges by the step, not by the period.
 bool steps_may_decide(const MotionSearch& search)
 {
   constexpr double of_settling = 512; // periods
@@ -336,7 +346,8 @@ bool steps_may_decide(const MotionSearch& search)
   const SettledMotion& settled = search.found.settled;
   const bool open = scene.fidelity == CycleModel::automatic && scene.cycle.steps_per_period == 0;
   const double of_period = finer * search.found.cycle.steps_per_period * work_of_step(search.point.model->structure);
-  if (!open || !has_run(settled.outcome) || of_settling * of_period > affordable_work) return false;
+  if (!open || of_settling * of_period > affordable_work) return false;
+  if (!has_run(settled.outcome)) return is_open(search.found) && finer * search.found.cycle.steps_per_period <= finest;
   const SettledBySteps now = by_steps(settled);
   if (const std::optional<SettledBySteps>& before = search.by_fewer_steps)
     return before->kind != now.kind || !alike(before->energy, now.energy) || !alike(before->exponent, now.exponent);
@@ -347,7 +358,6 @@ bool steps_may_decide(const MotionSearch& search)
 /// of the last two numbers of steps stands, and the change of the energy between them is its error.
 bool takes_finer_steps(MotionSearch& search)
 {
-  constexpr int finest = 1024;
   SettledMotion& settled = search.found.settled;
   if (search.ended || !steps_may_decide(search)) return false;
   search.begin_steps = finer * search.found.cycle.steps_per_period;

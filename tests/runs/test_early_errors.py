@@ -159,7 +159,7 @@ def test_a_state_to_start_from_is_read_before_the_first_stage(squeal, tmp_path, 
     (tmp_path / "short.state").write_bytes(b"no vector")
     for arguments in ([], ["--dry-run"]):
         refused(squeal(OSCILLATOR, "--set", f"{key}.enabled=true", "--set", f"{key}.start={tmp_path}/short.state", *arguments,
-                       ranks=ranks), "short.state", "not a PETSc binary vector")
+                       ranks=ranks), "short.state", "not a vector in PETSc's binary format")
 
 
 def test_an_option_that_turns_out_unused_leaves_earlier_results(squeal):
