@@ -28,10 +28,10 @@ def fitted(module_run):
 
 
 def test_ranks_agree(reduced):
-    """5e-5 and 2e-3: a cycle of 60 steps depends on where among them it begins, by up to its step's error (1e-3 of the
+    """1e-4 and 2e-3: a cycle of 60 steps depends on where among them it begins, by up to its step's error (1e-3 of the
     period, 2e-2 of the energy); it begins in phase, but free motion, which lift-off makes chaotic, got there."""
     for other in reduced[1:]:
-        assert other["cycle"]["period"] == pytest.approx(reduced[0]["cycle"]["period"], rel=5e-5)
+        assert other["cycle"]["period"] == pytest.approx(reduced[0]["cycle"]["period"], rel=1e-4)
         assert energy(other) == pytest.approx(energy(reduced[0]), rel=2e-3)
         # an attachment of which about 1e-5 is new, where such shapes are dropped, may stay on some ranks alone
         assert abs(other["fidelity"]["size"] - reduced[0]["fidelity"]["size"]) <= 1
