@@ -137,7 +137,7 @@ template <class Work> void for_each_case(Work work)
 }
 
 /// A model with its rows.
-struct Model
+struct PatchModel
 {
   DofMap dofs;
   Structure structure;
@@ -145,9 +145,9 @@ struct Model
   Interface interface;
 };
 
-Model model_of(const Blocks& blocks)
+PatchModel model_of(const Blocks& blocks)
 {
-  Model model;
+  PatchModel model;
   model.pairs = make_pairs(blocks.mesh, blocks.scene).pairs;
   const Partition partition = partition_mesh(blocks.mesh, model.pairs, ranks_of(world));
   model.dofs = number_dofs(blocks.mesh, blocks.scene, partition, world);
@@ -222,7 +222,7 @@ TEST_CASE("constant pressure passes through")
         constexpr double pressure = 1e6;
         b.scene.supports = {{"low:end", {true, true, true}}, {"high:end", {true, true, false}}};
         b.scene.pressures = {{"high:end", pressure}};
-        const Model model = model_of(b);
+        const PatchModel model = model_of(b);
         // The parts that face nothing carry the same pressure: the whole surface's nodal forces less the pairs'.
         std::map<int, double> load;
         for (const char* surface : {"low:face", "high:face"})
@@ -283,7 +283,7 @@ TEST_CASE("slave nodes on a support hand their rows over: the others keep full r
     for (const int node : b.mesh.node_groups.at("high:face"))
       if (b.mesh.nodes[node][0] < 1e-9) b.mesh.node_groups["rim"].push_back(node);
     const auto all = pairs_of(blocks(layouts[1], shape, shape), SlaveSide::stator);
-    const Model model = model_of(b);
+    const PatchModel model = model_of(b);
     // The two corners coincide with master nodes, which nothing else of the rim reads alone: they keep their rows.
     CHECK(model.pairs.size() + b.mesh.node_groups.at("rim").size() == all.size() + 2);
     double area = 0;
