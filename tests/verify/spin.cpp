@@ -36,15 +36,15 @@ small_fem::Mesh annulus(const Annulus& a)
   return small_fem::joined({small_fem::bricks(a.cells, place)});
 }
 
-struct Model
+struct SpinModel
 {
   Mesh mesh;
   Scene scene;
 };
 
-Model spinning(const small_fem::Mesh& body, const Rotation& rotation, const Material& material)
+SpinModel spinning(const small_fem::Mesh& body, const Rotation& rotation, const Material& material)
 {
-  Model model;
+  SpinModel model;
   model.mesh.nodes.assign(body.x.begin(), body.x.end());
   for (const auto& nodes : body.elements)
   {
@@ -118,7 +118,7 @@ std::array<double, 2> doublet(int n, double rate)
 /// The pairs of a ring that moves in its plane.
 std::vector<double> ring_pairs(int cells, double rate, double band)
 {
-  Model model = spinning(annulus({R - thickness / 2, R + thickness / 2, depth, {cells, 1, 1}}), {{0, 0, 1}, {}, rate},
+  SpinModel model = spinning(annulus({R - thickness / 2, R + thickness / 2, depth, {cells, 1, 1}}), {{0, 0, 1}, {}, rate},
                          {E, 0, rho});
   model.scene.supports.push_back({"disc", {false, false, true}});
   return pairs_of(build(model.mesh, model.scene, world), band);
@@ -133,7 +133,7 @@ TEST_CASE("rigid motions of a part that spins keep no stiffness, and tilts have 
   for (const Shape shape : shapes)
   {
     const auto body = small_fem::in_shape(annulus({0.3, 0.5, 0.1, {14, 1, 1}, 0.03, centre}), shape);
-    const Model model = spinning(body, {axis, centre, rate}, {E, 0.3, rho});
+    const SpinModel model = spinning(body, {axis, centre, rate}, {E, 0.3, rho});
     const Built built = build(model.mesh, model.scene, world);
     const auto& [M, C, K, G] = std::tie(built.structure.M, built.structure.C, built.structure.K, built.structure.G);
     std::array<Owned<Vec>, 3> tilts;
@@ -157,7 +157,7 @@ TEST_CASE("a free ring nutates at its rate times the ratio of its moments of ine
 {
   // stiff: strains of the gyroscopic moment change the frequency by (rate/elastic)^2
   const double rate = 3;
-  const Model model = spinning(annulus({0.4, 0.5, 0.1, {16, 1, 1}}), {{0, 0, 1}, {}, rate}, {E, 0.3, rho});
+  const SpinModel model = spinning(annulus({0.4, 0.5, 0.1, {16, 1, 1}}), {{0, 0, 1}, {}, rate}, {E, 0.3, rho});
   Built built = build(model.mesh, model.scene, world);
   const Owned<Vec> tilt = sample(built.structure, rigid_motion({}, {1, 0, 0})),
                    turn = sample(built.structure, rigid_motion({}, {0, 0, 1}));
@@ -201,7 +201,7 @@ TEST_CASE("what is no solid of revolution about its axis does not spin")
   const Annulus a{0.3, 0.5, 0.1, {14, 1, 1}};
   const Material steel{E, 0.3, rho};
   const Rotation rotation{{0, 0, 1}, {}, 10};
-  const auto fails = [&](const Model& model) { CHECK_THROWS_AS((void)build(model.mesh, model.scene, world), Error); };
+  const auto fails = [&](const SpinModel& model) { CHECK_THROWS_AS((void)build(model.mesh, model.scene, world), Error); };
   auto slotted = annulus(a);
   slotted.elements.pop_back();
   fails(spinning(slotted, rotation, steel));
@@ -212,6 +212,6 @@ TEST_CASE("what is no solid of revolution about its axis does not spin")
                                      return Vec3{x - 0.5, y - 0.5, z};
                                    }),
                  rotation, steel));
-  const Model fits = spinning(annulus(a), {{0, 0, 1}, {0, 0, 7}, 10}, steel);
+  const SpinModel fits = spinning(annulus(a), {{0, 0, 1}, {0, 0, 7}, 10}, steel);
   CHECK_NOTHROW((void)build(fits.mesh, fits.scene, world));
 }
