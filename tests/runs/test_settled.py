@@ -216,7 +216,7 @@ def test_a_grid_too_coarse_for_a_light_foot_is_no_irregular_motion(squeal, tmp_p
     cycle = run.report["cycle"]
     assert run.code == 0 and "squeals at" in run.report["heard"]
     steps = [attempt["steps_per_period"] for attempt in cycle["attempts"]]
-    assert steps[0] == 64 and steps == sorted(steps) and steps[-1] >= 256 and cycle["attempts"][-1]["outcome"] == "converged"
+    assert steps == sorted(steps) and steps[-1] >= 256 and cycle["attempts"][-1]["outcome"] == "converged"
     assert cycle["period"] == pytest.approx(1 / 0.19081, rel=1e-3)
     assert cycle["mean_fluctuating_energy"] == pytest.approx(11.89, rel=1e-2)
     largest = cycle["multipliers"]["values"][0]

@@ -19,7 +19,7 @@ TEST_CASE("a failed library call throws PETSc's own text")
 {
   Owned<Vec> x;
   check(VecCreate(PETSC_COMM_WORLD, x.put()));
-  CHECK_THROWS_AS(check(VecSetSizes(x, 3, 2)), Error); // more local entries than there are in all
+  CHECK_THROWS_AS(check(VecSetSizes(x, 3, 2)), LibraryError); // more local entries than there are in all
 }
 
 TEST_CASE("an exception in a callback comes out of the library call that led there")
