@@ -167,11 +167,12 @@ def test_a_bracket_walks_until_its_spring_holds_it(scene, converged):
 
 @pytest.mark.parametrize("load", [12, 30])
 def test_a_higher_load_before_leaves_a_joint_at_the_edge_of_its_range(scene, converged, load):
+    """400 steps leave 2e-5 of the period; which step holds the joint's last slip moves the energy by 3e-3."""
     press = f'[[step]]\nname = "press"\nforces = [{load}, 1, 1, 1]\n[[step]]\nname = "release"\n'
     cycle = converged(scene(STUCK, more=press), ranks=1).report["cycle"]
     assert cycle["joints"]["largest_use"] == pytest.approx(1, abs=1e-4)
-    assert cycle["period"] == pytest.approx(5.95524, rel=1e-5)
-    assert cycle["mean_fluctuating_energy"] == pytest.approx(1.46082, rel=1e-3)
+    assert cycle["period"] == pytest.approx(5.95512, rel=5e-5)  # that of 1600 steps
+    assert cycle["mean_fluctuating_energy"] == pytest.approx(1.46100, rel=4e-3)
 
 
 def test_a_joint_that_nothing_holds_walks(scene, squeal):

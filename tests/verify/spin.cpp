@@ -118,8 +118,8 @@ std::array<double, 2> doublet(int n, double rate)
 /// The pairs of a ring that moves in its plane.
 std::vector<double> ring_pairs(int cells, double rate, double band)
 {
-  SpinModel model = spinning(annulus({R - thickness / 2, R + thickness / 2, depth, {cells, 1, 1}}), {{0, 0, 1}, {}, rate},
-                         {E, 0, rho});
+  SpinModel model = spinning(annulus({R - thickness / 2, R + thickness / 2, depth, {cells, 1, 1}}),
+                             {{0, 0, 1}, {}, rate}, {E, 0, rho});
   model.scene.supports.push_back({"disc", {false, false, true}});
   return pairs_of(build(model.mesh, model.scene, world), band);
 }
@@ -201,7 +201,8 @@ TEST_CASE("what is no solid of revolution about its axis does not spin")
   const Annulus a{0.3, 0.5, 0.1, {14, 1, 1}};
   const Material steel{E, 0.3, rho};
   const Rotation rotation{{0, 0, 1}, {}, 10};
-  const auto fails = [&](const SpinModel& model) { CHECK_THROWS_AS((void)build(model.mesh, model.scene, world), Error); };
+  const auto fails = [&](const SpinModel& model)
+  { CHECK_THROWS_AS((void)build(model.mesh, model.scene, world), Error); };
   auto slotted = annulus(a);
   slotted.elements.pop_back();
   fails(spinning(slotted, rotation, steel));
