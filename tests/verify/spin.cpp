@@ -59,24 +59,10 @@ SpinModel spinning(const small_fem::Mesh& body, const Rotation& rotation, const 
   return model;
 }
 
-double norm_of(Vec x)
-{
-  double norm = 0;
-  check(VecNorm(x, NORM_INFINITY, &norm));
-  return norm;
-}
-
-double norm_of(Mat A)
-{
-  double norm = 0;
-  check(MatNorm(A, NORM_INFINITY, &norm));
-  return norm;
-}
-
 /// A x over the sizes of both.
 double relative_product(Mat A, Vec x)
 {
-  return largest_of_product(A, x) / (norm_of(A) * norm_of(x));
+  return largest_of_product(A, x) / (norm_of(A, NORM_INFINITY) * norm_of(x, NORM_INFINITY));
 }
 
 const std::array shapes = {Shape::hex8, Shape::wedge6,  Shape::hex20, Shape::tet10,
