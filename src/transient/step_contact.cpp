@@ -178,18 +178,19 @@ void record_contact(const Interface& interface, const State& state, const std::v
   MPI_Bcast(record.opposes_theta.data(), interface.pairs, MPI_CHAR, 0, comm);
 }
 
-/// Solves the problem, again where pairs turned. Which ones do is told loosely where joints take many sweeps.
+/// Solves the problem, again where pairs turned. Joints take many sweeps: a first solution of low accuracy tells which
+/// of their pairs do.
 void solve_again(const OneStep& one, StepProblem& problem)
 {
   ContactMemory& memory = one.work.memory;
   ContactSettings loose = one.step.contact;
   loose.tolerance = std::max(loose.tolerance, 1e-4);
-  bool again = has_undriven_pairs(one.interface);
-  if (again) solve_once(one, loose, problem);
-  for (bool first = !again; first || again; first = false)
+  bool solved = has_undriven_pairs(one.interface);
+  if (solved) solve_once(one, loose, problem);
+  for (bool again = true; again; solved = true)
   {
     again = solve_once(one, one.step.contact, problem);
-    if (first) continue;
+    if (!solved) continue;
     // the solution before is none of the past
     memory.r.erase(memory.r.begin() + 1);
     memory.Wr.erase(memory.Wr.begin() + 1);
