@@ -117,22 +117,12 @@ void copy_column(const MultiVector& X, Index j, Vec x)
 MultiVector product(Mat A, const MultiVector& X)
 {
   MultiVector Y{X.comm, MatrixXd(own_rows(A).size(), X.columns())};
-  const auto rows_of = [&](const MultiVector& columns)
-  {
-    Owned<Mat> dense;
-    check(MatCreateDense(comm_of(A), static_cast<PetscInt>(columns.entries.rows()), PETSC_DECIDE, PETSC_DETERMINE,
-                         static_cast<PetscInt>(columns.columns()), const_cast<double*>(columns.entries.data()),
-                         dense.put()));
-    return dense;
-  };
   if (X.columns() <= 2 || !is_sparse(A))
-    multiply_few(A, X, Y);
-  else
   {
-    const Owned<Mat> from = rows_of(X), to = rows_of(Y);
-    Mat result = to;
-    check(MatMatMult(A, from, MAT_REUSE_MATRIX, PETSC_DEFAULT, &result));
+    multiply_few(A, X, Y);
+    return Y;
   }
+  Y.entries = sparse_product(A, X.entries);
   return Y;
 }
 

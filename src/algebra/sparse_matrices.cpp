@@ -12,33 +12,6 @@ namespace
 
 using Two = double __attribute__((vector_size(16)));
 
-/// The rows of a matrix on one rank, lent for as long as the object lives.
-class CompressedRows
-{
-public:
-  explicit CompressedRows(Mat A) : A_(A)
-  {
-    PetscBool done = PETSC_FALSE;
-    check(MatGetRowIJ(A, 0, PETSC_FALSE, PETSC_FALSE, &rows, &starts, &columns, &done));
-    check(MatSeqAIJGetArrayRead(A, &values));
-  }
-  ~CompressedRows()
-  {
-    PetscBool done = PETSC_FALSE;
-    (void)MatSeqAIJRestoreArrayRead(A_, &values);
-    (void)MatRestoreRowIJ(A_, 0, PETSC_FALSE, PETSC_FALSE, &rows, &starts, &columns, &done);
-  }
-  CompressedRows(const CompressedRows&) = delete;
-  CompressedRows& operator=(const CompressedRows&) = delete;
-
-  PetscInt rows = 0;
-  const PetscInt *starts = nullptr, *columns = nullptr;
-  const PetscScalar* values = nullptr;
-
-private:
-  Mat A_;
-};
-
 /// Entries of both matrices at x_j = (v_j, u_j). Without fused products, so that K u of a body that moves without
 /// strain is zero to the last bit.
 Two entry_times(const std::array<double, 2>& value, const Two* x)
@@ -100,7 +73,9 @@ bool have_one_pattern(const CompressedRows& M, const CompressedRows& K)
 std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
 {
   if (!is_sparse(M) || !is_sparse(K)) return std::nullopt;
-  PairedMatrices matrices{comm_of(M), {}, {}, 0, {}};
+  SplitMatrix of_M = split(M);
+  const SplitMatrix of_K = split(K);
+  PairedMatrices matrices{comm_of(M), {}, {}, static_cast<std::size_t>(of_M.received), {}};
   int alike = 1; // on all ranks
   const auto join = [&](Mat left, Mat right, PairedRows& rows, bool upper)
   {
@@ -109,25 +84,11 @@ std::optional<PairedMatrices> pair_matrices(Mat M, Mat K)
     for (PetscInt i = 0; alike && i < m.rows; ++i)
       alike = append_row(m, k, i, upper ? i : 0, rows) || !upper; // a row begins with its diagonal entry
   };
-  if (ranks_of(matrices.comm) == 1)
-    join(M, K, matrices.own, true);
-  else
-  {
-    Mat own_M = nullptr, own_K = nullptr, foreign_M = nullptr, foreign_K = nullptr;
-    const PetscInt* places = nullptr; // of the foreign columns
-    PetscLayout layout = nullptr;
-    check(MatMPIAIJGetSeqAIJ(K, &own_K, &foreign_K, nullptr));
-    check(MatMPIAIJGetSeqAIJ(M, &own_M, &foreign_M, &places));
-    join(own_M, own_K, matrices.own, true);
-    join(foreign_M, foreign_K, matrices.foreign, false);
-    matrices.received = static_cast<std::size_t>(column_count(foreign_M));
-    check(MatGetLayouts(M, nullptr, &layout));
-    check(PetscSFCreate(matrices.comm, matrices.exchange.put()));
-    check(
-        PetscSFSetGraphLayout(matrices.exchange, layout, column_count(foreign_M), nullptr, PETSC_COPY_VALUES, places));
-  }
+  join(of_M.own, of_K.own, matrices.own, true);
+  if (of_M.foreign) join(of_M.foreign, of_K.foreign, matrices.foreign, false);
   MPI_Allreduce(MPI_IN_PLACE, &alike, 1, MPI_INT, MPI_LAND, matrices.comm);
   if (!alike) return std::nullopt;
+  matrices.exchange = std::move(of_M.exchange);
   return matrices;
 }
 
@@ -145,8 +106,9 @@ void multiply_both(const PairedMatrices& matrices, const std::array<Vec, 2>& of,
   add_own(matrices.own, x.data(), y.data());
   if (ranks_of(matrices.comm) > 1)
   {
-    check(PetscSFBcastBegin(matrices.exchange, MPIU_2SCALAR, x.data(), z.data(), MPI_REPLACE));
-    check(PetscSFBcastEnd(matrices.exchange, MPIU_2SCALAR, x.data(), z.data(), MPI_REPLACE));
+    const RowType row(2);
+    check(PetscSFBcastBegin(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
+    check(PetscSFBcastEnd(matrices.exchange, row.type, x.data(), z.data(), MPI_REPLACE));
     add_foreign(matrices.foreign, z.data(), y.data());
   }
   for (std::size_t part = 0; part < 2; ++part)
@@ -158,11 +120,86 @@ void multiply_both(const PairedMatrices& matrices, const std::array<Vec, 2>& of,
   }
 }
 
+namespace
+{
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr int lanes = 16; // columns at once
+
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, lanes, Eigen::RowMajor>;
+
+/// y gains A x. Sums of a row stay in registers, which Eigen's own product does not see to.
+void add_product(const CompressedRows& A, const Rows& x, Rows& y)
+{
+  for (PetscInt i = 0; i < A.rows; ++i)
+  {
+    Eigen::Matrix<double, 1, lanes> sum = Eigen::Matrix<double, 1, lanes>::Zero();
+    for (PetscInt k = A.starts[i]; k < A.starts[i + 1]; ++k) sum += A.values[k] * x.row(A.columns[k]);
+    y.row(i) += sum;
+  }
+}
+
+} // namespace
+
+RowType::RowType(std::size_t numbers)
+{
+  MPI_Type_contiguous(static_cast<int>(numbers), MPI_DOUBLE, &type);
+  MPI_Type_commit(&type);
+}
+
+RowType::~RowType()
+{
+  MPI_Type_free(&type);
+}
+
+SplitMatrix split(Mat A)
+{
+  SplitMatrix parts{A};
+  PetscBool several = PETSC_FALSE;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(A), MATMPIAIJ, &several));
+  if (!several) return parts;
+  const PetscInt* places = nullptr;
+  PetscLayout layout = nullptr;
+  check(MatMPIAIJGetSeqAIJ(A, &parts.own, &parts.foreign, &places));
+  check(MatGetLocalSize(parts.foreign, nullptr, &parts.received));
+  check(MatGetLayouts(A, nullptr, &layout));
+  check(PetscSFCreate(comm_of(A), parts.exchange.put()));
+  check(PetscSFSetGraphLayout(parts.exchange, layout, parts.received, nullptr, PETSC_COPY_VALUES, places));
+  return parts;
+}
+
 bool is_sparse(Mat A)
 {
   PetscBool sparse = PETSC_FALSE;
   check(PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(A), &sparse, MATSEQAIJ, MATMPIAIJ, ""));
   return sparse;
+}
+
+MatrixXd sparse_product(Mat A, const MatrixXd& X)
+{
+  const SplitMatrix parts = split(A);
+  const CompressedRows own(parts.own);
+  const RowType row(lanes);
+  MatrixXd Y(own.rows, X.cols());
+  Rows x = Rows::Zero(X.rows(), lanes), y(own.rows, lanes), received(parts.received, lanes);
+  for (Index first = 0; first < X.cols(); first += lanes)
+  {
+    const Index count = std::min<Index>(lanes, X.cols() - first);
+    x.leftCols(count) = X.middleCols(first, count);
+    if (parts.foreign) check(PetscSFBcastBegin(parts.exchange, row.type, x.data(), received.data(), MPI_REPLACE));
+    y.setZero();
+    add_product(own, x, y);
+    if (parts.foreign)
+    {
+      check(PetscSFBcastEnd(parts.exchange, row.type, x.data(), received.data(), MPI_REPLACE));
+      const CompressedRows foreign(parts.foreign);
+      add_product(foreign, received, y);
+    }
+    Y.middleCols(first, count) = y.leftCols(count);
+  }
+  return Y;
 }
 
 } // namespace squeal

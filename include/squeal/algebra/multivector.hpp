@@ -1,6 +1,6 @@
 #pragma once
-/// Distributed vectors side by side: a sparse matrix is read once for several of them, and products among them are
-/// dense matrix products. Every function is collective; small matrices are whole on every rank.
+/// Distributed vectors side by side: a sparse matrix is read once for every sixteen of them, and products among them
+/// are dense matrix products. Every function is collective; small matrices are whole on every rank.
 #include "squeal/base/petsc.hpp"
 
 #include <Eigen/Core>
