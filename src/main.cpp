@@ -280,15 +280,12 @@ int main(int argc, char** argv)
   }
   try
   {
-    const int code = run_program(arguments);
-    end_run_control();
-    return code;
+    return run_program(arguments);
   }
   catch (const Interrupted&)
   {
     if (rank == 0)
       std::printf("ended %s before the first stage: the same command begins again\n", who_asked_to_end().c_str());
-    end_run_control();
     return static_cast<int>(ExitCode::interrupted);
   }
   catch (const OutOfMemory& error)

@@ -114,11 +114,6 @@ void begin_run_control(const RunLimits& limits)
   if (ignores_hangup) std::signal(SIGHUP, SIG_IGN);
 }
 
-void end_run_control()
-{
-  for (const auto& [number, name] : ending_signals) std::signal(number, SIG_DFL);
-}
-
 bool end_is_asked(MPI_Comm comm)
 {
   Control& own = control();

@@ -157,6 +157,18 @@ def test_a_signal_ends_the_run_in_order(tmp_path, ranks, number):
     assert not partial(output).exists()
 
 
+def test_a_signal_after_the_results_leaves_the_exit_code(tmp_path):
+    """A scheduler's notice that finds the process on its way out, a hundred times."""
+    run = start(tmp_path / "results", "--set", "transient.enabled=false", "--set", "cycle.enabled=false")
+    for line in run.stdout:
+        if line.startswith("results are in"):
+            break
+    while run.poll() is None:
+        run.send_signal(signal.SIGUSR1)
+        time.sleep(0.001)
+    assert run.returncode == 0
+
+
 MODES_ONLY = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false",
               "--set", "modes.method=full", "--set", "friction.coefficient=0.5"]
 UNDER_WAY = {  # where a library or another process is at work: ranks, scene and arguments, what the log shows

@@ -29,11 +29,9 @@ const std::string& launched_rank();
 /// run of one process outlives its shell.
 void end_with_launcher();
 
-/// From here on SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2 and SIGXCPU are requests to end.
+/// From here on SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2 and SIGXCPU are requests to end. They stay so to the end of
+/// the process: one that comes after the results are written does not take the exit code from them.
 void begin_run_control(const RunLimits& limits);
-
-/// From here on signals end the process as usual.
-void end_run_control();
 
 /// Whether the run is asked to end, agreed by all ranks. Collective, and cheap enough to be asked after every time
 /// step. Of fewer ranks than work together nothing is ever asked.
