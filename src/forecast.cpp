@@ -65,7 +65,7 @@ constexpr double number = sizeof(double);                               // [byte
 constexpr double matrix_entry = sizeof(PetscScalar) + sizeof(PetscInt); // in PETSc's rows
 constexpr double triplet = sizeof(PetscScalar) + 2 * sizeof(int);       // of what a factor is made from
 
-/// What the stages' parts are counted by, of all ranks together.
+/// The sizes that set the stages' work, of all ranks together.
 struct Sizes
 {
   double dofs = 0, entries = 0;  // of K

@@ -234,7 +234,7 @@ void end_all(int rank, const char* kind, const char* text)
   MPI_Abort(PETSC_COMM_WORLD, 1);
 }
 
-/// Of a failure that all ranks share; a name of any length may be in it.
+/// Prints an error that all ranks share; its text is cut, since a name in it may have any length.
 void print_error(int rank, const std::exception& error)
 {
   if (rank == 0) std::fprintf(stderr, "squeal: error: %.3000s\n", error.what());

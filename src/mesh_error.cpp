@@ -129,7 +129,7 @@ MeshError skipped(const std::string& reason)
   return result;
 }
 
-/// Of each mode the one that is most like it on the finer mesh with these closed pairs.
+/// Finds, for each mode, the mode most like it on the finer mesh with these closed pairs.
 std::vector<FinerMode> find_finer(std::span<const ComplexMode* const> modes, const Prolongation& prolong,
                                   const SlidingEquilibrium& sliding, const PencilOptions& options)
 {

@@ -1,5 +1,5 @@
 #pragma once
-/// What a run will take, before its first stage (src/README.md, section 8.9).
+/// The forecast of a run's memory and time, before its first stage (src/README.md, section 8.9).
 #include "squeal/model.hpp"
 #include "squeal/options.hpp"
 #include "squeal/report/report.hpp"

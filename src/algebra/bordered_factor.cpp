@@ -68,7 +68,7 @@ PencilFactor by_mumps(Mat A)
   return PencilFactor(A, nullptr, Keep::factor, {room, 0, "factor_"});
 }
 
-/// What will be factored, how and in which order.
+/// The plan of a factor: its matrix, kind and order.
 struct Plan
 {
   FactorKind kind;         // not automatic
@@ -91,13 +91,13 @@ Plan make_plan(Mat A, Mat B, const FactorOptions& options)
   return plan;
 }
 
-/// Of a dense factor of n columns with so many rows below them.
+/// Operations of a dense factor of some columns with rows below them.
 double operations_of(double columns, double below)
 {
   return columns * (columns * columns / 3 + columns * below + below * below);
 }
 
-/// Of the supernodes, and of a rank's share of them.
+/// Operations of all supernodes.
 double operations_of(const SymbolicFactor& symbolic)
 {
   double sum = 0;

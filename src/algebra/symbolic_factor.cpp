@@ -325,7 +325,7 @@ SymbolicFactor analysis_of(const Triplets& lower, int dofs, int border)
   return result;
 }
 
-/// Of the entries' places and of the sizes.
+/// A hash of the entries' places and of the sizes.
 std::uint64_t hash_of(const Triplets& lower, int dofs, int border)
 {
   const auto both = [](int a, int b)

@@ -109,7 +109,7 @@ private:
     };
   }
 
-  /// Of the value set last.
+  /// The equilibrium at the value set last.
   const Equilibrium& equilibrium()
   {
     BrakeAt& at = *at_;

@@ -94,7 +94,7 @@ BorderedVector direction_between(const BranchCorrector& corrector, const BranchP
   return direction;
 }
 
-/// What does not depend on the phase at which an orbit begins: parameter over its range, ln T, ln E.
+/// Measures that the phase of an orbit's start leaves alone: parameter over its range, ln T, ln E.
 Eigen::Vector3d without_phase(const BranchCorrector& corrector, const BranchPoint& orbit)
 {
   return {orbit.parameter / corrector.scales.parameter, std::log(orbit.orbit.period),

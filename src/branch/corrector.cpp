@@ -152,7 +152,7 @@ BorderedVector tangent_at(BranchCorrector& corrector, const BranchPoint& point, 
 namespace
 {
 
-/// What is counted on an orbit. A change of a count is an event.
+/// A count on an orbit; its change is an event.
 using Count = std::function<int(const BranchPoint&)>;
 
 /// How the event of a count is looked for.

@@ -65,7 +65,7 @@ struct KnownBeyond
   std::size_t place = 0;
 };
 
-/// What is known at the start of a side, of each kind of event.
+/// The numbers of multipliers beyond the unit circle at the start of a side, for each kind of event.
 std::array<KnownBeyond, 2> known_beyond(const Multipliers& start);
 
 /// The event by which the last of a side's orbits has another number of multipliers beyond the unit circle than is

@@ -1,5 +1,5 @@
 #pragma once
-/// What the contact solvers share: one problem while it is being solved.
+/// The state that the contact solvers share: one problem while it is being solved.
 #include "squeal/contact/pair_law.hpp"
 #include "squeal/contact/solver.hpp"
 

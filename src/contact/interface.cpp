@@ -45,7 +45,7 @@ std::vector<Vec3> tangent_axes(const Contact& contact, const Vec3& normal, const
   return axes;
 }
 
-/// Of a file that need not be there.
+/// Reads the compliance of each pair, if the file is there.
 void read_compliance(const std::filesystem::path& file, Interface& interface, MPI_Comm comm)
 {
   if (!is_there(file, comm)) return;

@@ -123,7 +123,7 @@ struct SlipAngle
     return std::nullopt;
   }
 
-  /// Of all slip directions on the circle, the one nearest to `start`.
+  /// The solution whose slip direction is nearest to `start`, among all on the circle.
   std::optional<PairVector> scan(double start) const
   {
     constexpr int intervals = 64;

@@ -314,7 +314,7 @@ std::string find_by_reduced_model(CycleProblem& problem, const CycleOptions& opt
   return {};
 }
 
-/// The same, where no reduced model can be made, too.
+/// Finds the cycle so; the sentence also says why no reduced model can be made.
 std::string try_reduced_model(CycleProblem& problem, const CycleOptions& options, FittedCycle& found)
 {
   try

@@ -25,7 +25,7 @@ using Eigen::VectorXd;
 // parts of a change on other steps that are taken for the error
 constexpr double of_order_2 = 4. / 3, of_order_1 = 2;
 
-/// What a pair did over recorded periods.
+/// The statuses that a pair had over recorded periods.
 struct PairHistory
 {
   bool opened = false, closed = false, stuck = false;

@@ -94,7 +94,7 @@ void keep_cycles_of(Flow& flow, const Structure& structure)
 namespace
 {
 
-/// Of the state about the equilibrium, in the energy norm.
+/// The energy norm of a state about the equilibrium.
 double fluctuation_norm(const CycleProblem& problem, const State& state)
 {
   const Owned<Vec> moved = copy_of(state.u.get());
@@ -103,7 +103,7 @@ double fluctuation_norm(const CycleProblem& problem, const State& state)
       2 * (potential_energy(problem.sliding.structure, moved) + kinetic_energy(problem.sliding.structure, state.v)));
 }
 
-/// Of the followed mode at an amplitude of 1.
+/// The energy norm of the followed mode at an amplitude of 1.
 double unit_norm(const CycleProblem& problem)
 {
   return fluctuation_norm(problem, mode_state(problem.sliding.equilibrium, problem.unstable.modes.front(), 1,

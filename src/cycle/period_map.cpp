@@ -31,9 +31,9 @@ double step_for(const PeriodMap& map, double period)
 
 constexpr double neglected = 1e-2; // of what a period moves, by its contact
 
-/// Of contact in a period with its rate. An error of this part of the largest reaction in every step moves the end of
-/// the period by about as much, and a period of shooting lowers the residual by less than a hundred times. Passes to
-/// less than `loosest` take no time.
+/// The contact tolerance of a period with its rate, a part of the largest reaction. An error of it in every step moves
+/// the end of the period by about as much, and a period of shooting lowers the residual by less than a hundred times.
+/// Passes to less than `loosest` take no time.
 double contact_tolerance_for(const PeriodMap& map)
 {
   constexpr double lowered = 1e-2, loosest = 1e-6;

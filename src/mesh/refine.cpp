@@ -38,7 +38,7 @@ constexpr std::array<std::array<Pair, 2>, 3> diagonals = {{{{{0, 1}, {2, 3}}}, {
 /// Children beside those of the corners.
 using Middle = std::vector<Child>;
 
-/// Of a tetrahedron by the diagonal.
+/// The children at the middle of a shape; a tetrahedron is divided by the diagonal.
 std::vector<Middle> middle_children(Shape shape)
 {
   const Child triangle = {{0, 1}, {1, 2}, {2, 0}}, lower = {{0, 1}, {1, 2}, {2, 0}, {0, 4}, {1, 5}, {2, 3}},

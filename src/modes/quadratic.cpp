@@ -31,7 +31,7 @@ Owned<Mat> scaled(Mat A, double factor)
   return result;
 }
 
-/// What counts the solves of TOAR and shows their number, and the exception of a call.
+/// The counter of TOAR's solves, which it shows, and the exception of a call.
 struct Watch
 {
   MPI_Comm comm;

@@ -47,7 +47,7 @@ struct Orthonormal
   double smallest = 1; // part of a direction that was new when it came, squared: rounding is larger by its inverse
 };
 
-/// What became of columns that a basis was to take in.
+/// The outcome of extending a basis by columns.
 struct Extension
 {
   Index taken = 0, left_out = 0; // directions; left out: by the cap alone

@@ -22,7 +22,7 @@ Eigen::SparseMatrix<double> sliding_forces(const Interface& interface, const std
 /// P = F'B Z of the forces F, columns on the active pairs' rows.
 Owned<Mat> force_rows(const Eigen::SparseMatrix<double>& forces, Mat BZ);
 
-/// What makes the shapes Z E^-1 P', a column each force.
+/// The factor and rows that make the shapes Z E^-1 P', a column for each force.
 struct Attachments
 {
   const Factor& factor; // of E = K_z + w^2 M_z, bordered by P

@@ -161,8 +161,8 @@ MeanValue with_step_error(double value, double relative)
   return {value, std::isfinite(relative) ? relative * value : 0};
 }
 
-/// What starts lead to in place of the cycle. Means agree; steps that do not fit the period may keep a motion on a
-/// slowly attracting cycle varying.
+/// A sentence about the motions that starts lead to in place of the cycle. Means agree. Steps that do not fit the
+/// period may keep a motion varying beside a slowly attracting cycle.
 std::string starts_beside_cycle(const Report& report)
 {
   const LimitCycle& cycle = report.motion.cycle;

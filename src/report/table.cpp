@@ -17,7 +17,7 @@ using Place = Result::Place;
 
 constexpr std::size_t width = 100; // letters of a row
 
-/// What a table shows.
+/// The extent of a table.
 struct Shown
 {
   bool all = false;         // of the results that a person reads; else the brief ones

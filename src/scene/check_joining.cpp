@@ -214,7 +214,7 @@ bool is_outside(double value, double least, double greatest)
   return value < least || value > greatest;
 }
 
-/// What is implausible about a material; empty if nothing is.
+/// A sentence about an implausible material; empty: it is plausible.
 std::string doubt_about(const Material& material, double young)
 {
   const double speed = std::sqrt(young / material.density);

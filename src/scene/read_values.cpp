@@ -178,7 +178,7 @@ private:
     return sign * named->second;
   }
 
-  /// What a message says besides about a text that names no number.
+  /// The hint that a message adds about a text that names no number.
   std::string hint_of_number(const toml::node& node) const
   {
     const auto text = node.value_exact<std::string>();

@@ -192,7 +192,7 @@ double standard_quantile(double part)
   return boost::math::quantile(standard, least + part * (1 - 2 * least));
 }
 
-/// What is wrong with the keys of a number's distribution; empty: nothing.
+/// The error in the keys of a number's distribution; empty: none.
 std::string problem_of_form(const UncertainNumber& number)
 {
   if (number.distribution == Distribution::uniform)

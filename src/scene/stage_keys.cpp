@@ -12,7 +12,7 @@ using enum Rule;
 using enum Effect;
 using Study::derive, Study::double_it, Study::derive_and_double;
 
-/// Of beams and connectors.
+/// The key of the loss factor of beams and connectors.
 SceneKey loss_factor_key(double& loss_factor)
 {
   return {"loss_factor", &loss_factor, "-",   "eta of its stiffness K (1 + i eta), as of a [[part]]",

@@ -25,7 +25,7 @@ std::string joined(const std::vector<std::string>& words);
 /// Returns "; did you mean 'x'?", or the list of known words if none is near.
 std::string hint_or_list(const std::string& word, const std::vector<std::string>& known);
 
-/// What the parser says, without the names of its own macros.
+/// The parser's message, without the names of its own macros.
 std::string text_of(const toml::parse_error& error);
 
 /// Applies "table.key=value" to the tables of a scene.

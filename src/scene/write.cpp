@@ -139,7 +139,7 @@ SceneKeys keys_of_table(const TableTarget& table)
   return table.entry(0).keys;
 }
 
-/// What a key's value must be: one of its words, or a number by its rule. Empty: the unit says it.
+/// The rule of a key's value: one of its words, or the range of a number. Empty: the unit says it.
 std::string rule_text(const SceneKey& key)
 {
   Words words;

@@ -11,7 +11,7 @@ namespace squeal
 namespace
 {
 
-/// Of two exponents that are zero: a torus, or a motion that winds down to a cycle.
+/// The verdict where two exponents are zero: a torus, or a motion that winds down to a cycle.
 MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencies& base)
 {
   const MeanValue decay = decay_of_spread(energies);
@@ -37,8 +37,8 @@ MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencie
                  decay.error, 3 / std::max({decay.value, decay.error, 1e-6}))};
 }
 
-/// Of an exponent above zero. A mean's bar comes from batches, and a series shorter than some 50 correlation times has
-/// no batches that are independent (Sokal 1997).
+/// The verdict where an exponent is above zero. A mean's bar comes from batches; a series shorter than some 50
+/// correlation times has no independent ones (Sokal 1997).
 MotionVerdict judge_irregular(std::span<const double> energies)
 {
   constexpr double enough = 50; // correlation times

@@ -32,7 +32,7 @@ void subtract(const MotionShapes& motion, const Eigen::VectorXd& a, Vec r)
   check(VecAXPY(r, -1, sum));
 }
 
-/// What V misses of v becomes a shape of its own. Nothing where it has no mass.
+/// Adds the part of v that V misses as a shape of its own, unless it has no mass.
 void add_shape(MotionShapes& motion, Mat M, Vec v, Vec Mv)
 {
   const Owned<Vec> rest = copy_of(v), image = copy_of(Mv);

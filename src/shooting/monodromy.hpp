@@ -38,7 +38,7 @@ struct OtherGrid
 /// Moved by half a step, and of twice as many: the change on this one is 3/4 of the error of a step of order 2.
 inline constexpr std::array other_grids = {OtherGrid{{0.5, 1}, 1}, OtherGrid{{0, 2}, 4. / 3}};
 
-/// What grids of time change: of each of the values the distance to its partner, and the rise of its modulus.
+/// The change of each value between grids of time: the distance to its partner, and the rise of its modulus.
 struct GridErrors
 {
   explicit GridErrors(std::size_t values) : errors(values, 0.), rises(values, 0.) {}
@@ -80,7 +80,7 @@ struct StateBlock
   Eigen::Index columns() const { return u.columns(); }
 };
 
-/// Of at least one state.
+/// The states as columns; there is at least one.
 StateBlock block_of(std::span<const Owned<Vec>> states);
 
 /// The columns as states like `pattern`.

@@ -247,7 +247,7 @@ BorderedVector step_from(const OrbitProblem& problem, const ShootingOptions& opt
   return step;
 }
 
-/// What this step changes.
+/// The relative change of an orbit by a step.
 RelativeChange change_by(const OrbitProblem& problem, const Orbit& orbit, const BorderedVector& step)
 {
   const Owned<Vec> fluctuation = fluctuation_of(problem, orbit);

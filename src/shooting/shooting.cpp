@@ -20,7 +20,7 @@ namespace
 //
 // Caveat: a solution of the projected equations leaves a defect outside the subspace, which need not be small.
 
-/// What PETSc's callbacks share.
+/// The data that PETSc's callbacks share.
 struct SubspaceSystem
 {
   const OrbitProblem& problem;
@@ -232,7 +232,7 @@ struct Search
   const ShootingStart& start;
 };
 
-/// What shooting from one state led to.
+/// The result of shooting from one state.
 struct Attempt
 {
   StageResult found;

@@ -146,8 +146,8 @@ bool is_left_open_by_one(const Multipliers& multipliers)
   return true;
 }
 
-/// What the distance of a motion from the orbit grows by, from smaller and smaller parts of the fluctuation until that
-/// is what the deciding multiplier says; of an unstable orbit from one part alone. The largest part comes first.
+/// The growth of the distance from the orbit, for motions that start at smaller and smaller parts of the fluctuation,
+/// largest first, until it agrees with the deciding multiplier. An unstable orbit takes one start.
 std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
                                        const FloquetAnalysis& floquet, long periods)
 {

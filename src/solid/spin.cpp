@@ -161,7 +161,7 @@ std::vector<double> displacements(const Structure& structure, Vec force)
   return all_entries(u);
 }
 
-/// Of the nodes of an element, from all free degrees of freedom.
+/// The displacements of an element's nodes, from all free degrees of freedom.
 Eigen::VectorXd of_nodes(const LocalDofs& local, const std::vector<double>& u, std::size_t order)
 {
   Eigen::VectorXd result = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(order));

@@ -33,7 +33,7 @@ MultiVector weighted_sum(const Matrices& matrices, const ComplexFactors& factors
   return sum;
 }
 
-/// Of Q(lambda), where C has the viscous equivalent of the loss factors.
+/// The factors of Q(lambda), where C has the viscous equivalent of the loss factors.
 ComplexFactors factors_of(Complex lambda, const Structure& structure)
 {
   ComplexFactors factors = loss_factors(lambda);
@@ -41,7 +41,7 @@ ComplexFactors factors_of(Complex lambda, const Structure& structure)
   return factors;
 }
 
-/// Of its derivative.
+/// The factors of Q's derivative.
 ComplexFactors slopes_of(Complex lambda, const Structure& structure)
 {
   return {2. * lambda, 1, 0, structure.K_loss.get() ? -1 / structure.loss_omega : 0};

@@ -185,7 +185,7 @@ std::vector<TwoSidedPair> inexact(const SolvedPairs& solved, const PointProblem&
 }
 
 /// The projected problem on the shapes, which come after the sketched columns; K_loss is empty without loss factors.
-/// What holds nothing is held by springs as stiff as the structure: it vibrates far above any window.
+/// Shapes that nothing holds get springs as stiff as the structure, so that they vibrate far above any window.
 LossyMatrices without_sketch(const PointMatrices& on_basis, Index shapes)
 {
   const auto on_shapes = [&](const MatrixXd& A) -> MatrixXd

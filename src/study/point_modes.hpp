@@ -49,7 +49,7 @@ bool correct(ModesBasis& modes, MultiVector residuals);
 /// The scale of backward errors, w^2 |M| + w |C| + |K| with w = |lambda| [N/m].
 double scale_of(const ModesBasis& modes, std::complex<double> lambda);
 
-/// What modes are sought on, and how exactly.
+/// The problem whose modes are sought, and its tolerances.
 struct PointProblem
 {
   const SlidingEquilibrium& sliding;
@@ -109,10 +109,10 @@ struct Followed : SweptPlace
 /// At least this much of a mode, or of a subspace, must be found again.
 inline constexpr double clear_mac = 0.9;
 
-/// The same where other pairs are closed: modes jump there. More than half of a mode is in one other alone.
+/// The least MAC of a match across a change of closed pairs, where modes jump: at most one other mode exceeds half.
 inline constexpr double clear_mac_across = 0.6;
 
-/// How near a ratio is to 1: one above 1 is as far off as its inverse. Of a ratio of the form b it is the MAC.
+/// The ratio, or its inverse where it exceeds 1. Of a ratio of the form b it is the MAC.
 double folded(double ratio);
 
 /// The form b of section 10.3 between the modes of two points, with the matrices of one of them.
@@ -136,7 +136,7 @@ std::vector<int> names_by_shapes(const PointModes& reference, const PointModes& 
 /// least `clear`. Not collective.
 std::vector<Match> follow(const ModeForms& forms, double clear);
 
-/// What a search between two points needs.
+/// The functions of a search between two points.
 struct ThresholdSearch
 {
   std::function<std::optional<Followed>(double value)> point_at; // of the first number; nothing where it fails

@@ -109,7 +109,7 @@ void find_powers(const SlidingEquilibrium& sliding, const HeldMode& mode, ModeCa
     causes.defect = std::accumulate(powers->begin(), powers->end(), causes.defect);
 }
 
-/// What each component holds of the energies: what doubling its mass and stiffness adds.
+/// Finds the share of each component in the energies: what doubling its mass and stiffness adds.
 void find_shares(const SensitivityProblem& problem, const std::vector<HeldMode>& modes, Sensitivity& result)
 {
   const Structure& own = problem.sliding.structure;

@@ -147,7 +147,7 @@ private:
     record(now, {});
   }
 
-  /// What counts as clear where a step cannot be halved any further.
+  /// The least MAC of a clear match where a step cannot be halved any further.
   double least_clear(const Followed& before, const Followed& now)
   {
     return model_.same_pairs_closed(before, now) ? clear_mac : clear_mac_across;

@@ -27,7 +27,7 @@ public:
   /// Finds the equilibrium of a point. The pairs that are closed at all points prepared are those of the basis.
   void prepare(const SweptPlace& place);
 
-  /// What cannot be computed at a point, for whatever reason, is in the outcome.
+  /// The equilibrium at a point; its outcome says why one could not be computed.
   const Equilibrium& equilibrium_at(const SweptPlace& place) { return known_at(place).equilibrium; }
   PointModes modes_at(const SweptPlace& place, double tolerance);
 

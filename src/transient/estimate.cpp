@@ -62,7 +62,7 @@ double power_at(const PairMotion& pair, double q, double angle)
   return power;
 }
 
-// What rounding leaves of the integral: the differences in power_at are of terms of this size.
+/// The rounding error of the integral: the differences in power_at are of terms of this size.
 double rounding(const PairMotion& pair, double q, double length)
 {
   const double force = std::abs(pair.reaction) + pair.reaction0 / q;

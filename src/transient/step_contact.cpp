@@ -165,7 +165,7 @@ void share_from_rank_zero(const OneStep& one, const std::string& problem)
   one.state.reactions.assign(message.begin() + head, message.end());
 }
 
-/// What the tangent needs of the contact just solved, on every rank; `past` is rank 0's. Collective.
+/// Records the contact just solved for the tangent, on every rank; `past` is rank 0's. Collective.
 void record_contact(const Interface& interface, const State& state, const std::vector<double>& past, StepRecord& record)
 {
   const MPI_Comm comm = comm_of(interface.B);

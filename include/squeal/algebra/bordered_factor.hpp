@@ -34,7 +34,7 @@ class KnownAnalyses;
 /// One that knows none yet.
 std::shared_ptr<KnownAnalyses> no_analyses();
 
-/// Of every stage that factors a symmetric positive definite matrix.
+/// The options of every stage that factors a symmetric positive definite matrix.
 struct FactorOptions
 {
   FactorKind kind = FactorKind::automatic;

@@ -35,7 +35,7 @@ Share share_of(Eigen::Index count, MPI_Comm comm);
 /// Gives every rank the entries that the others computed of `count` ones of `length` numbers each, one after the other.
 /// Collective.
 void gather_shares(double* values, Eigen::Index count, Eigen::Index length, MPI_Comm comm);
-/// The same of columns. Collective.
+/// Gathers the shared columns of A. Collective.
 void gather_columns(Eigen::MatrixXd& A, MPI_Comm comm);
 
 /// A x by two real products, which BLAS does: of a real with a complex matrix Eigen makes a slow loop of its own.
@@ -52,7 +52,7 @@ Eigen::MatrixXd parts_of(const Eigen::MatrixXcd& x);
 
 /// A^-1 B by LU with row interchanges. Throws Error with the text `singular` if a pivot is zero.
 Eigen::MatrixXd solve_dense(Eigen::MatrixXd A, const Eigen::MatrixXd& B, const char* singular);
-/// The same in the place of B.
+/// Replaces B by A^-1 B.
 void solve_dense_in_place(Eigen::MatrixXd A, Eigen::Ref<Eigen::MatrixXd> B, const char* singular);
 
 /// An orthonormal basis of the span of independent columns.

@@ -1,5 +1,5 @@
 #pragma once
-/// What a motion has settled on (src/README.md, section 9.5): means of a window, their trend, and which motions are the
+/// The attractors of motions (src/README.md, section 9.5): means of a window, their trend, and which motions are the
 /// same. Arithmetic on lists that every rank has; no function throws.
 #include "squeal/base/words.hpp"
 #include "squeal/settled/motion.hpp"
@@ -12,7 +12,7 @@
 namespace squeal
 {
 
-/// What a motion does at the end.
+/// The kind of a motion at its end.
 enum class ReachedKind
 {
   rest,      // the motion decayed
@@ -35,9 +35,9 @@ struct ReachedMotion
 /// [Hz] Of upward zero crossings [s], from their second half, with a bar; zero where they are too few.
 MeanValue frequency_of(const std::vector<double>& crossings);
 
-/// What one motion has settled on, from the mean energies of its periods and the upward zero crossings [s] of a
-/// coordinate. `rest`: an energy below it is that of a motion at rest. Fewer than 20 periods are unsettled: the energy
-/// is the mean of their second half, its bar their range.
+/// The attractor of one motion, from the mean energies of its periods and the upward zero crossings [s] of a
+/// coordinate. An energy below `rest` is that of a motion at rest. Fewer than 20 periods are unsettled: the energy is
+/// the mean of their second half, its bar their range.
 ReachedMotion reached_by(const std::vector<double>& energies, const std::vector<double>& crossings, double rest);
 
 /// Whether energies and frequencies agree within their bars, or within a percent and a thousandth.

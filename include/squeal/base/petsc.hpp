@@ -130,7 +130,7 @@ struct IndexRange
   bool holds(PetscInt number) const { return number >= first && number < last; }
 };
 
-/// What this rank has: entries, rows, and columns as of the vectors that A multiplies.
+/// The share of this rank: entries, rows, and columns as of the vectors that A multiplies.
 IndexRange own_range(Vec x);
 IndexRange own_rows(Mat A);
 IndexRange own_columns(Mat A);

@@ -12,7 +12,7 @@
 namespace squeal
 {
 
-/// What a family tells of a closed orbit besides its multipliers. Counts are over one period.
+/// The measures of a closed orbit besides its multipliers. Counts are over one period.
 struct PointMeasures
 {
   double mean_energy = 0, mean_fluctuating_energy = 0; // [J]
@@ -48,7 +48,7 @@ struct BranchPoint
   PointMeasures measures{};
 };
 
-/// What happens along a branch.
+/// The events along a branch.
 enum class BranchEventKind
 {
   hopf,            // the sliding equilibrium gains or loses an unstable mode

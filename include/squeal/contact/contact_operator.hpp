@@ -51,7 +51,7 @@ Turn all_pairs(std::size_t pairs);
 class ContactOperator
 {
 public:
-  /// Of the part of the pair's own block, in a row, that the near field may lack: a larger one makes sweeps cheaper and
+  /// The part of a pair's own block that the near field may lack in its row. A larger one makes sweeps cheaper and
   /// products with W more frequent.
   static constexpr double left_out = 1e-2;
 
@@ -74,7 +74,7 @@ public:
 
   /// y = W x. Collective of the ranks that share W.
   void multiply(std::span<const double> x, std::span<double> y) const;
-  /// The same on rank 0 alone, which has all entries.
+  /// y = W x on rank 0 alone, which has all entries.
   void multiply_alone(std::span<const double> x, std::span<double> y) const;
 
   /// Gathers shared entries on rank 0, which keeps them all besides. Collective.
@@ -85,7 +85,7 @@ public:
   /// w += W dr of a change dr of one pair's reaction. Rank 0 has all entries.
   void add_product(std::size_t pair, const PairVector& change, std::span<double> w) const;
 
-  /// The same by the near field, in the rows of this rank's pairs. Small operators have none.
+  /// Adds that product of the near field, in the rows of this rank's pairs. Small operators have no near field.
   void add_product(std::size_t pair, const PairVector& change, std::span<float> w) const;
   bool has_near_field() const { return !near_.empty(); }
 

@@ -25,7 +25,7 @@ struct Interface
   std::vector<double> slip_compliance;       // [m/N] per pair, in series with its friction; empty: stick is rigid
   PairFriction friction;
 
-  /// Of a contact vector.
+  /// The length of a contact vector.
   std::size_t size() const { return PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs)); }
 };
 
@@ -67,7 +67,7 @@ void check_interface(const Interface& interface, const std::string& source, MPI_
 /// B x, whole on every rank. Collective.
 std::vector<double> relative(const Interface& interface, Vec x);
 
-/// The same of several vectors, in one message: latency counts on small models. Collective.
+/// B x of several vectors, in one message: latency counts on small models. Collective.
 std::vector<std::vector<double>> relative(const Interface& interface, std::span<const Vec> x);
 
 /// y += B^T r. Collective; r the same on every rank.
@@ -130,7 +130,7 @@ inline std::vector<ContactStatus> contact_status(const Interface& interface, con
                         interface.friction);
 }
 
-/// The same from the velocities v at the end of the step. Collective.
+/// The statuses from the velocities v at the end of the step. Collective.
 std::vector<ContactStatus> contact_status(const Interface& interface, const std::vector<double>& reactions, Vec v);
 
 // Which sliding velocity friction opposes in a step of the theta method (src/README.md, section 4.3):
@@ -156,7 +156,7 @@ PairFriction sliding_on(const PairFriction& friction, PairView<const double> pas
 /// Whether friction of the pair opposes s+.
 bool opposes_end(PairView<const double> past, std::size_t pair);
 
-// What the reactions of a contact add up to (src/README.md, section 2.7).
+// Resultants of a contact's reactions (src/README.md, section 2.7).
 
 /// Sums over the pairs of one contact.
 struct ContactResultant

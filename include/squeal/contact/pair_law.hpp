@@ -235,7 +235,7 @@ struct SlidingFriction
 /// Zero where s is.
 SlidingFriction sliding_friction(const FrictionLaw& law, double r_n, std::span<const double> s);
 
-/// What takes a tangential vector (t1, t2) back into a disc around zero; 1 inside it.
+/// The factor that takes a tangential vector (t1, t2) back onto a disc around zero; 1 inside it.
 inline double disc_factor(double t1, double t2, double radius)
 {
   const double size = length(t1, t2);
@@ -264,7 +264,7 @@ inline double natural_map(const PairVector& r, const PairVector& w, const Fricti
   return std::sqrt(normal * normal + d1 * d1 + d2 * d2);
 }
 
-/// Of the local problem; `last`: the pair's reaction so far, which decides between several slip directions.
+/// The reaction of a pair's own problem; `last`: its reaction so far, which decides between several slip directions.
 PairVector solve_pair(const PairBlock& A, const PairVector& q, int directions, const FrictionLaw& law,
                       const PairVector& last);
 
@@ -291,7 +291,7 @@ inline PairVector first_reaction(const PairBlock& A, const PairVector& r, const 
   return has_two_levels(law) ? solve_pair(A, velocity_without(A, r, w), directions, law, r) : admissible(r, w, law);
 }
 
-/// What a pair does.
+/// The status of a pair.
 enum class ContactStatus : char
 {
   open,
@@ -322,7 +322,7 @@ inline CompliantGap compliant_gap(double c, double theta, double h)
   return {1 / (theta * theta * h), (1 - theta) / theta, c / (theta * theta * h)};
 }
 
-// What residuals of contact are compared with (src/README.md, section 4.6). Arithmetic of one rank.
+// Scales of contact residuals (src/README.md, section 4.6). Arithmetic of one rank.
 
 /// The force that a pair's natural map is compared with [N]: the largest reaction, of its contact or of all, or where
 /// it is smaller the force that would give the pair the largest free velocity `speed`. A light pair beside heavy ones

@@ -36,7 +36,7 @@ struct FidelityRequest
   int begin_steps = first_steps; // a period at which "auto" begins where the scene leaves them open
 };
 
-/// What was used, what was left out, and how that is known. Errors are relative; energy: the mean fluctuating one.
+/// The model that a cycle was found on, with its errors, which are relative; energy: the mean fluctuating one.
 struct Fidelity
 {
   CycleModel asked = CycleModel::full, used = CycleModel::full; // used: full or reduced
@@ -50,7 +50,7 @@ struct Fidelity
   bool chooses_steps = false;                  // until the accuracy is met; else the scene gives them
   double contact_tolerance = 0;
   long reduced_periods = 0, full_periods = 0;
-  /// Of the model: what all further corrections would change. NaN: not known.
+  /// Errors of the model: the change by all further corrections. NaN: not known.
   double frequency_error = std::numeric_limits<double>::quiet_NaN(), energy_error = frequency_error;
   double step_frequency_error = frequency_error, step_energy_error = frequency_error; // of the step size
   double reduction_seconds = 0, reduced_seconds = 0, full_seconds = 0;

@@ -25,7 +25,7 @@ struct CycleOptions
 // norm sqrt(u'K u + v'M v) only. All functions are collective. Those that integrate throw Interrupted where the run is
 // asked to end.
 
-/// What one factorisation of the step costs.
+/// The time of one factorisation of the step.
 struct StepCosts
 {
   double factor_seconds = 0, condensed_seconds = 0;

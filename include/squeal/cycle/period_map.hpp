@@ -61,7 +61,7 @@ Flow flow_of(PeriodMap& map);
 
 // One period of the brake, recorded, and what is measured on it (src/README.md, section 6.10).
 
-/// What is measured on one period.
+/// The measures of one period.
 struct MeasuredPeriod
 {
   State start;                                         // with the reactions there
@@ -75,7 +75,7 @@ struct MeasuredPeriod
   std::vector<std::vector<ContactStatus>> statuses; // [step][pair]
 };
 
-/// What is kept of a period.
+/// The record of a period that is asked for.
 struct Recording
 {
   Mat probes = nullptr; // a row for each probe, or null

@@ -48,7 +48,7 @@ enum class FrictionDamping
   of_speed,
 };
 
-/// The same on the rows of B: C_f = B'D B. Null if it is zero. Collective.
+/// D, the damping C_f on the rows of B: C_f = B'D B. Null if it is zero. Collective.
 Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>& closed,
                             const std::vector<double>& reactions, FrictionDamping part);
 

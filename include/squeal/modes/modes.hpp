@@ -43,7 +43,7 @@ struct RealModes
   std::vector<Owned<Vec>> shapes; // in the structure's dofs
 };
 
-/// What certifies that no mode is missing.
+/// The count that certifies that no mode is missing.
 enum class Certificate
 {
   none,

@@ -94,7 +94,7 @@ double backward_error(const QuadraticProblem& problem, const QuadraticNorms& nor
 /// f
 std::complex<double> loss_factor_of(std::complex<double> lambda);
 
-/// Of M, C, K and K_loss.
+/// Factors of M, C, K and K_loss.
 using ComplexFactors = std::array<std::complex<double>, 4>;
 
 /// lambda^2, lambda, 1 and f

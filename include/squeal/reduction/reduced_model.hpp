@@ -101,13 +101,13 @@ inline double memory_of_reduction(double dofs, double shapes)
   return sizeof(double) * dofs * shapes;
 }
 
-/// Of the free memory, what a model's shapes may take [byte]: its matrices and the steps of the full model need room.
+/// The memory that a model's shapes may take [byte]: its matrices and the steps of the full model need the rest.
 inline double memory_for_shapes(double free)
 {
   return free / 2;
 }
 
-/// What each pair does in the motion that a model is made for. Pairs that are neither active nor sliding stay open.
+/// The roles of pairs in the motion that a model is made for. Pairs that are neither active nor sliding stay open.
 struct PairRoles
 {
   std::vector<int> active;       // ascending
@@ -115,7 +115,7 @@ struct PairRoles
   std::vector<double> reactions; // [N] a contact vector: means over the motion, which turn the friction of C_f
 };
 
-/// The same with the roles of all pairs given.
+/// The reduced model with the roles of all pairs given.
 ReducedModel reduce(const SlidingEquilibrium& sliding, const std::vector<ComplexMode>& modes, const PairRoles& roles,
                     const Reduction& reduction);
 

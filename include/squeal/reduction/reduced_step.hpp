@@ -42,7 +42,7 @@ struct ReducedMap
   long unconverged = 0;
 };
 
-/// Of an active pair, rigid ones included.
+/// The gap law of an active pair, rigid ones included.
 CompliantGap gap_law(const ReducedMap& map, std::size_t pair);
 
 /// The matrices of the period's step size, unless they are those already. Throws Error where a motion has neither mass
@@ -74,7 +74,7 @@ PeriodEnd end_of_period(ReducedMap& map, double period, ReducedState state);
 /// The contact of each step of a period.
 std::vector<StepRecord> record_contacts(ReducedMap& map, double period, ReducedState state);
 
-/// The same of the full model's recorded steps, as the reduced model sees them.
+/// The contacts of the full model's recorded steps, as the reduced model sees them.
 std::vector<StepRecord> recorded_contacts(const ReducedModel& model, int directions,
                                           std::span<const StepRecord> records);
 

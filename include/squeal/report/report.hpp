@@ -69,7 +69,7 @@ struct ModelSummary
   std::vector<Coverage> coverage;    // one a contact; empty on a matrix scene
 };
 
-/// What a stage took.
+/// The time and memory of a stage.
 struct Timing
 {
   Stage stage{};

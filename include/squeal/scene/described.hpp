@@ -75,7 +75,7 @@ enum class Rule
   below_two, // in [0, 2)
 };
 
-/// What studies do with a number unless the scene says which numbers they take.
+/// The studies that take a number by default, where the scene names none.
 enum class Study
 {
   nothing,

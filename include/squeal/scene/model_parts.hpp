@@ -1,6 +1,6 @@
 #pragma once
-/// What the model of a scene is made of: materials, parts, points, springs, supports, loads, contacts and ties, as
-/// plain data in SI units.
+/// The pieces of a scene's model: materials, parts, points, springs, supports, loads, contacts and ties, as plain data
+/// in SI units.
 #include "squeal/base/vec3.hpp"
 #include "squeal/base/words.hpp"
 

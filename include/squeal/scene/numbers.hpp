@@ -43,8 +43,8 @@ enum class Effect
 /// Returns the scene with other values of numbers that it has. Throws Error if that is no scene.
 Scene scene_with(const Scene& scene, std::span<const SceneNumber> numbers);
 
-/// What has mass or stiffness of its own: a part, point, rigid body or spring. With the numbers `doubled` it has twice
-/// of both. Without any it is what the others leave: given matrices, or superelements.
+/// A component with mass or stiffness of its own: a part, point, rigid body or spring. Twice the numbers `doubled`
+/// double both. Without any it is the rest of the model: given matrices, or superelements.
 struct SceneComponent
 {
   std::string table, name;

@@ -87,7 +87,7 @@ struct Spectrum
 /// Frequencies of lines are refined between the points of the transform by the shape of the window.
 Spectrum spectrum_of(std::span<const double> samples, double step_size);
 
-/// Of lines n f_1 + m f_2. `second` is 0 where every line is a multiple of the first.
+/// The frequencies of lines n f_1 + m f_2. `second` is 0 where every line is a multiple of the first.
 struct BaseFrequencies
 {
   double first = 0, second = 0; // [Hz] of the strongest line, and of the strongest that is no multiple of it
@@ -98,16 +98,16 @@ struct BaseFrequencies
 /// The base frequencies of a spectrum, the first one that of its strongest line.
 BaseFrequencies base_frequencies(const Spectrum& spectrum);
 
-/// The same with the first frequency given.
+/// Finds the second frequency beside a given first one.
 BaseFrequencies base_frequencies(const Spectrum& spectrum, double first);
 
 /// [s] after which a motion of these comes back; that of the first where the second is no fraction of it.
 double period_of(const BaseFrequencies& base);
 
-// What a motion settles on where no cycle attracts: its statistics and its kind, on any flow with a tangent
+// The motion that is reached where no cycle attracts: its statistics and its kind, on any flow with a tangent
 // (src/README.md, section 7.10).
 
-/// What attracts a motion.
+/// The kind of the attractor.
 enum class MotionKind
 {
   undecided,

@@ -80,7 +80,7 @@ enum class Crossing
 
 template <> inline constexpr std::array words_of<Crossing> = {"", "fold", "period doubling", "Neimark-Sacker"};
 
-/// What a motion beside an orbit was seen to do that began along the fastest motion.
+/// The growth seen in time of a motion that began beside an orbit, along its fastest growing direction.
 struct SeenGrowth
 {
   long periods = 0; // integrated until the distance became large or vanished; 0: too few for a line
@@ -105,15 +105,15 @@ struct Multipliers
   int offsets = 0;                                       // held, each with a multiplier 1 that is left out
   std::vector<SeenGrowth> seen{};                        // from smaller and smaller parts; the last is the smallest
 
-  /// Of the modulus of a value.
+  /// The upper bound of a value's modulus.
   double upper_bound(std::size_t i) const { return upper.empty() ? std::abs(values[i]) + errors[i] : upper[i]; }
 };
 
 /// The place of the value whose upper bound is largest: it decides. 0 where none was examined.
 std::size_t deciding_place(const Multipliers& multipliers);
 
-/// Of the moduli of all; NaN where none was examined. An orbit is stable where it is below 1, though the bar of a value
-/// that the grid of time lowers may reach across.
+/// The largest upper bound of all moduli; NaN where none was examined. An orbit is stable where it is below 1, though
+/// the bar of a value that the grid of time lowers may reach across.
 double largest_upper_bound(const Multipliers& multipliers);
 
 /// Whether the bar of the deciding one holds 1.

@@ -38,7 +38,7 @@ struct RelativeChange
   double frequency = 0, energy = 0;
 };
 
-/// What is sought. A stage borrows it and never changes it.
+/// The problem of a closed orbit. A stage borrows it and never changes it.
 struct OrbitProblem
 {
   const Flow& flow;
@@ -70,7 +70,7 @@ struct NewtonRecord
   double residual_projected = 0, residual_full = 0;
 };
 
-/// What the solver has done.
+/// The steps and periods that the solver has done.
 struct Convergence
 {
   std::vector<NewtonRecord> records;

@@ -54,7 +54,7 @@ struct ShootingStart
   int rounds = 1;                              // of a cycle: as many as the period may be of it
 };
 
-/// What is asked of the solver.
+/// The settings of one solve.
 struct ShootingSettings
 {
   double tolerance = 0; // on the full-space residual

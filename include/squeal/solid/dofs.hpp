@@ -12,7 +12,7 @@
 namespace squeal
 {
 
-/// What each free degree of freedom is. Texts are made on demand only, since a model has many degrees of freedom.
+/// The names of free degrees of freedom. Texts are made on demand only, since a model has many degrees of freedom.
 struct DofNames
 {
   // Names of a mesh:

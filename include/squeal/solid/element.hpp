@@ -36,7 +36,7 @@ ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Mat
 std::vector<std::array<double, 6>> solid_stress(Shape shape, std::span<const Vec3> x, const Material& material,
                                                 std::span<const double> u);
 
-/// Of a solid that spins, in the frame at rest (src/README.md, section 1.10); in the order of ElementMatrices.
+/// Matrices of a solid that spins, in the frame at rest (src/README.md, section 1.10), in the order of ElementMatrices.
 struct SpinMatrices
 {
   Eigen::MatrixXd gyroscopic;  // [N s/m] skew

@@ -33,7 +33,7 @@ struct ResponseOptions
   int passes = 40;         // corrections of the basis, at most
 };
 
-/// What is driven and read, and at which frequencies.
+/// The probes that are driven and read, and the frequencies.
 struct ResponseProblem
 {
   SlidingEquilibrium sliding;

@@ -30,7 +30,7 @@ struct ChangeEffect
   std::complex<double> predicted, computed;
 };
 
-/// What a table of the scene holds of the energies of a mode.
+/// The share of a table of the scene in the energies of a mode.
 struct EnergyShare
 {
   std::string table, name; // as SceneComponent; "contact": of pairs with a compliance

@@ -59,8 +59,8 @@ struct UnstableModes
   std::span<const Estimate> estimates;
 };
 
-/// What a mode adds to a start, from its own estimate: q Re(phi e^{i phase}) and its velocity, without u0. Nothing
-/// where the estimate gives no amplitude to start from.
+/// The motion of a mode at its estimate: q Re(phi e^{i phase}) and its velocity, without u0. None where the estimate
+/// gives no amplitude to start from.
 std::optional<State> estimated_motion(const Equilibrium& equilibrium, const ComplexMode& mode,
                                       const Estimate& estimate);
 

@@ -17,7 +17,7 @@ struct ModeOnFinerMesh
   double backward_error = 0;          // of the finer ones; NaN: one was not found
 
   std::complex<double> corrected() const { return finer + (held - lambda) / 2.; }
-  /// Of the corrected one: the real part in growth [1/s], the imaginary part in angular frequency [rad/s].
+  /// The bar of `corrected`: of growth [1/s] in the real part, of angular frequency [rad/s] in the imaginary one.
   std::complex<double> bar() const
   {
     const std::complex<double> smooth = (held - lambda) / 2., contact = finer - other;

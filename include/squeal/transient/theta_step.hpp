@@ -25,7 +25,7 @@ struct StepOptions
   FactorOptions factor{}; // those of ProgramOptions
 };
 
-// What the tangent of a step needs to know of it (src/README.md, section 4.13). `advance` fills it where one is given.
+// Records of steps for their tangents (src/README.md, section 4.13). `advance` fills one where it is given.
 
 class LinearContact;
 
@@ -123,7 +123,7 @@ void solve_with_gyroscopic_part(const ThetaStep& step, Mat G, const SteppedMotio
 /// Must be called again after the state was changed by anything but `advance`.
 StepWork begin_steps(const ThetaStep& step, const Structure& structure, const Interface& interface, State& state);
 
-/// What one step reports: the terms of the energy identity
+/// The report of one step: the terms of the energy identity
 ///     E+ - E = (1/2 - theta)(dv'M dv + du'K du) - damping_work + contact_work + load_work   (+ defect),
 /// and the contact.
 struct StepReport

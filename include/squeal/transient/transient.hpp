@@ -42,7 +42,7 @@ template <class Visit, class... Histories> void for_each_series(const Visit& vis
   visit("slip", "pairs", histories.slip...);
 }
 
-/// What `march` counted.
+/// The counts of a march.
 struct MarchSummary
 {
   long steps = 0; // fewer than asked when the energy stopped being finite, or the run is asked to end
@@ -56,8 +56,7 @@ struct MarchSummary
   double contact_iterations_mean = 0;
 };
 
-/// What is kept of a march: `history` gains energies, powers, counts and the rows of `probes` (null: none) of each
-/// step.
+/// The record of a march: `history` gains energies, powers, counts and the rows of `probes` (null: none) of each step.
 struct Recorder
 {
   Mat probes = nullptr;
