@@ -1,11 +1,11 @@
-/// Memory by what each stage holds at its peak: what is resident after the model is made, by the system's own count,
-/// and copies of matrices, factors by their symbolic analysis, dense operators and vectors. Time by the two pieces of
-/// work that runs repeat: a factor, by its operations, and a step, by the memory that it reads (src/README.md, section
-/// 8.9).
+/// Memory by what each stage holds at its peak: the system's own count after the model is made, copies of matrices,
+/// factors by their symbolic analysis, dense operators and vectors. Time by the two pieces of work that runs repeat: a
+/// factor, by its operations, and a step, by the memory that it reads (src/README.md, section 8.9).
 #include "squeal/forecast.hpp"
 
 #include "squeal/algebra/bordered_factor.hpp"
 #include "squeal/base/available_memory.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "squeal/point.hpp"
 #include "squeal/reduction/reduced_model.hpp"
@@ -97,8 +97,8 @@ double memory_of_factor(const Sizes& sizes)
   return sizes.factor.bytes + 2 * triplet * sizes.entries / 2;
 }
 
-/// K with springs at the pairs, its factor, and five matrices of pairs: two parts of D, their sum with friction, a
-/// factor of that and, with springs, what these take off again.
+/// K with springs at the pairs, its factor, and five matrices of pairs. Those are two parts of D, their sum with
+/// friction, its factor and, with springs, the part taken off again.
 double memory_of_equilibrium(const Sizes& sizes)
 {
   return matrix_entry * sizes.entries + memory_of_factor(sizes) + sizes.condensed_operator() +
@@ -131,11 +131,12 @@ double memory_of_response(const Sizes& sizes, const Scene& scene, const ProgramO
 
 bool shares_operator(const Sizes& sizes)
 {
-  return sizes.factor.kind == FactorKind::supernodal && is_worth_sharing(sizes.contact, static_cast<int>(sizes.ranks));
+  return sizes.factor.kind == FactorKind::supernodal && sizes.ranks > 1 &&
+         sizes.contact * sizes.contact >= entries_per_exchange;
 }
 
-/// M and K together, the factor, and the near field in single precision, which may be all of W: 0.11 of it on the brake
-/// of 33 224 degrees of freedom. W is whole on rank 0, or ranks share its lower triangle.
+/// M and K together, the factor, and the near field in single precision, which may be all of W. W is whole on rank 0,
+/// or ranks share its lower triangle.
 double memory_of_step(const Sizes& sizes)
 {
   const double whole = sizes.condensed_operator(), near_field = whole / 2,

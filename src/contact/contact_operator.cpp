@@ -3,6 +3,7 @@
 #include "squeal/algebra/panel.hpp"
 #include "squeal/algebra/simd.hpp"
 #include "squeal/base/broadcast.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/free_memory.hpp"
 
@@ -18,8 +19,6 @@ namespace squeal
 
 namespace
 {
-
-constexpr std::size_t fits_the_cache = 250; // rows: sweeping over W itself is as quick
 
 /// In the precision of the target.
 template <class Entry, class Sum> SQUEAL_INLINE void add_block(const Entry* __restrict rows, std::size_t length,
@@ -87,11 +86,6 @@ std::vector<std::size_t> column_shares(std::size_t rows, MPI_Comm comm)
   return firsts;
 }
 
-bool is_worth_sharing(double rows, int ranks)
-{
-  return ranks > 1 && rows >= 1000;
-}
-
 ContactOperator::ContactOperator(std::vector<double> columns, int pairs, int directions, MPI_Comm comm)
     : directions_(directions), columns_(std::move(columns))
 {
@@ -102,7 +96,7 @@ ContactOperator::ContactOperator(std::vector<double> columns, int pairs, int dir
   if (ranks_of(comm) > 1) shared_by_ = comm;
   const CondensedStrip own{first_, last_, rows - first_, columns_.data()};
   set_diagonal(own, comm);
-  if (rows > fits_the_cache) set_near_field(own, comm);
+  if (static_cast<double>(rows * rows) > entries_in_cache) set_near_field(own, comm);
   if (near_.empty()) side_by_side_ = in_sequence_ = {all_pairs(diagonal_.size())};
 }
 
@@ -228,7 +222,7 @@ ContactOperator make_contact_operator(const Factor& factor, double scale, const 
 {
   const std::size_t rows = PairRows<std::size_t>(directions).rows_of(static_cast<std::size_t>(pairs));
   std::vector<double> columns;
-  if (!is_worth_sharing(static_cast<double>(rows), ranks_of(comm)))
+  if (ranks_of(comm) == 1 || static_cast<double>(rows * rows) < entries_per_exchange)
   {
     columns = factor.condensed(scale);
     for (std::size_t i = 0; i < added.size() && !columns.empty(); ++i) columns[i * (rows + 1)] += added[i];

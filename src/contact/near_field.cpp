@@ -4,6 +4,7 @@
 #include "near_field.hpp"
 
 #include "squeal/base/broadcast.hpp"
+#include "squeal/base/cost.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,10 +20,8 @@ namespace
 using Eigen::Index;
 using Sizes = Eigen::MatrixXf; // pairs x pairs
 
-// Sweeping over fewer pairs takes no longer than the messages between ranks.
-constexpr std::size_t least_of_a_rank = 500; // pairs
-constexpr double neighbour = 0.1;            // size of a block between neighbours, at least; they have 0.2 and more
-constexpr double strong_beside = 0.5;        // push of the other slices of a turn, over the own one's
+constexpr double neighbour = 0.1;     // size of a block between neighbours, at least; they have 0.2 and more
+constexpr double strong_beside = 0.5; // push of the other slices of a turn, over the own one's
 
 Index to_index(std::size_t number)
 {
@@ -76,8 +75,8 @@ std::vector<float> limits_of(const Sizes& sizes)
   return limits;
 }
 
-/// All pairs from one end to the other: by the distance in neighbours from a pair that is as far as any from the first
-/// one (George and Liu 1979, pseudo-peripheral node).
+/// All pairs from one end to the other, by the distance in neighbours from a pseudo-peripheral one (George and Liu
+/// 1979), which is as far as any from the first.
 std::vector<std::size_t> from_end_to_end(const Sizes& sizes)
 {
   const auto pairs = static_cast<std::size_t>(sizes.cols());
@@ -124,7 +123,7 @@ double push_beside(const Sizes& sizes, const std::vector<std::size_t>& order, st
 std::vector<std::size_t> places_of_ranks(const Sizes& sizes, const std::vector<std::size_t>& order, MPI_Comm comm)
 {
   const auto ranks = static_cast<std::size_t>(ranks_of(comm));
-  std::size_t sweeping = std::clamp<std::size_t>(order.size() / least_of_a_rank, 1, ranks);
+  std::size_t sweeping = std::clamp<std::size_t>(order.size() / static_cast<std::size_t>(pairs_per_exchange), 1, ranks);
   while (sweeping > 1 && !(push_beside(sizes, order, 2 * sweeping) <= strong_beside)) sweeping /= 2;
   std::vector<std::size_t> places;
   for (std::size_t rank = 0; rank <= ranks; ++rank)

@@ -164,7 +164,8 @@ recorded_model(const CycleProblem& problem, std::span<const std::vector<StepReco
                                             return history.stuck || history.turned;
                                           });
   const std::size_t rows = PairRows<std::size_t>(interface.directions).rows_of(roles.active.size());
-  const bool follow = slide && rows > 150; // friction, the normal force
+  const bool follow =
+      slide && static_cast<int>(2 * rows) > attachments_on_recorded_contact; // friction the normal force
   const RealModes beyond = modes_beyond_band(problem);
   const std::size_t forces =
       std::min(follow ? roles.active.size() : rows, static_cast<std::size_t>(attachments_on_recorded_contact));

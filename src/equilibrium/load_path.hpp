@@ -62,8 +62,6 @@ bool balances(const Structure& structure, const Interface& interface, Equilibriu
 
 // The rest of driven pairs where Newton's method on the statuses ends without one: 0 <= w _|_ r >= 0, N w = q + M r.
 
-constexpr Eigen::Index few_pairs = 12; // whose 4096 sets take less than the path of a thousand pairs
-
 /// The end of Lemke's path, on which z falls and one pair at a time is neither open nor closed (Cottle, Pang and Stone
 /// 1992, section 4.4). Nothing where it leads away.
 std::optional<StickSlipState> rest_by_path(const StickSlipOperator& of, const Eigen::VectorXd& q);

@@ -1,6 +1,7 @@
 #include "squeal/equilibrium/path_walk.hpp"
 
 #include "load_path.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/error.hpp"
 
 #include <algorithm>
@@ -135,8 +136,8 @@ std::string end_of(const PathProblem& problem, const PathWalk& walk, Advance las
   return format(text, walk.part, problem.ends[walk.step].name.c_str());
 }
 
-/// The whole path with each stretch in so many parts, which are halved where there is no solution, and where rows move
-/// as far as in the walk `before`: an increment that is shorter must move them less.
+/// Walks the whole path with each stretch in so many parts. A part is halved where it has no solution, and where rows
+/// move as far as in the walk `before`: a shorter increment must move them less.
 PathWalk walk_in_parts(const PathProblem& problem, int parts, const PathWalk& before)
 {
   const double most = before.completed ? std::max(0.75 * before.largest_move, least_move(before.q))
@@ -230,7 +231,8 @@ PathWalk rest_of(const PathProblem& problem, const std::vector<char>& expected)
   if (walk.completed) return walk;
   const auto found = rest_of_few(problem.of, walk.q);
   walk.completed = rests_from(found);
-  walk.impossible = !found && (walk.q.size() <= few_pairs || has_no_solution(problem.of, walk.q));
+  walk.impossible =
+      !found && (all_sets_are_cheap(static_cast<double>(walk.q.size())) || has_no_solution(problem.of, walk.q));
   return walk;
 }
 

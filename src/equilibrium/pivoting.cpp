@@ -1,5 +1,6 @@
 #include "load_path.hpp"
 #include "squeal/base/constants.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/equilibrium/path_walk.hpp"
 
@@ -125,7 +126,8 @@ std::optional<StickSlipState> rest_by_path(const StickSlipOperator& of, const Ve
 std::optional<StickSlipState> rest_of_few(const StickSlipOperator& of, const VectorXd& q)
 {
   const auto pairs = static_cast<std::size_t>(q.size());
-  for (std::size_t set = 0; q.size() <= few_pairs && set < (std::size_t{1} << pairs); ++set)
+  if (!all_sets_are_cheap(static_cast<double>(pairs))) return std::nullopt;
+  for (std::size_t set = 0; set < (std::size_t{1} << pairs); ++set)
   {
     std::vector<char> closed(pairs);
     for (std::size_t i = 0; i < pairs; ++i) closed[i] = (set >> i) & 1;

@@ -17,8 +17,8 @@ namespace
 using Complex = std::complex<double>;
 using Eigen::Index;
 
-/// The multipliers of these places along eight periods on a grid of 8 N + 1 steps, by projection on the vectors of all
-/// of them; then what each is a period: the root that is nearest to the value.
+/// The multipliers of these places over eight periods on a grid of 8 N + 1 steps, by projection on the vectors of all.
+/// Each is then taken to a period by the root nearest to its value.
 std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const WholeSpace& space,
                                          const std::vector<DenseEigenpair>& pairs, const std::vector<Index>& places)
 {
@@ -49,11 +49,11 @@ std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const Whole
   return values;
 }
 
-/// All multipliers. Bars: the change of each when the grid of time moves by half a step, and 4/3 of the change on one
-/// of twice as many steps, which is the error of a step of order 2. A contact that hits a mass moves it within a step
-/// by what the grid allows, and a grid with a whole number of steps a period places each impact at one point of its
-/// step. So the bars hold as well what changes along eight periods in 8 N + 1 steps, which place it at eight points.
-/// Bars of real multipliers hold by how much that of the shift in time misses 1 on either grid.
+/// All multipliers. Bars: the change of each when the grid moves by half a step, and 4/3 of the change at twice the
+/// steps, the error of a step of order 2. Where contact hits a mass within a step depends on the grid: a whole number
+/// of steps a period places each impact at one point of its step. So the bars hold as well what changes along eight
+/// periods in 8 N + 1 steps, which place it at eight points. Bars of real multipliers hold by how much that of the
+/// shift in time misses 1 on either grid.
 FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
 {
   FloquetAnalysis result;
@@ -127,18 +127,17 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
   return result;
 }
 
-constexpr PetscInt columns_of_whole = 200; // at most, as many as a projection and the search beside it take
-
 /// The cheapest way by the columns that it takes.
 MultiplierMethod chosen_method(const ShootingOptions& options, PetscInt dofs)
 {
   if (options.multiplier_method != MultiplierMethod::automatic) return options.multiplier_method;
-  return 2 * dofs <= (options.multipliers > 0 ? options.multipliers : columns_of_whole) ? MultiplierMethod::whole
-                                                                                        : MultiplierMethod::oblique;
+  return 2. * dofs <= (options.multipliers > 0 ? options.multipliers : columns_of_projection)
+             ? MultiplierMethod::whole
+             : MultiplierMethod::oblique;
 }
 
-/// Whether the whole matrix of a system that is not small is affordable: its columns on three grids of time, and as
-/// many eigenproblems, whose operations count a quarter of an entry read.
+/// Whether the whole matrix of a system that is not small is affordable. It takes columns on three grids of time, and
+/// as many eigenproblems; their operations count a quarter of an entry read.
 bool whole_is_affordable(const Flow& flow, PetscInt dofs)
 {
   constexpr double grids = 3, operations = 10; // of a dense eigenproblem, over the cube of its size

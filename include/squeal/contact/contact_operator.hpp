@@ -116,9 +116,6 @@ private:
 /// The first column of each rank and the end: equal parts of the lower triangle, of whole pairs.
 std::vector<std::size_t> column_shares(std::size_t rows, MPI_Comm comm);
 
-/// Whether ranks share an operator of so many rows: reading less takes no longer than two messages.
-bool is_worth_sharing(double rows, int ranks);
-
 /// From a dense symmetric W, stored by rows. Error: the number of its entries does not fit.
 ContactOperator make_contact_operator(std::vector<double> W, int pairs, int directions);
 

@@ -4,6 +4,7 @@
 ///     squeal may start.
 /// Z keeps closed pairs closed, Y removes their normal reactions; all three matrices are unsymmetric.
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/base/cost.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"
 
@@ -96,7 +97,7 @@ struct Modes
 /// Options -modes_...: how the eigenproblems are solved.
 struct ModesOptions
 {
-  PetscInt dense_limit = 400; // up to this size eigenproblems are solved whole by LAPACK
+  PetscInt dense_limit = rows_solved_whole; // up to this size eigenproblems are solved whole by LAPACK
   ModeShapes shapes = ModeShapes::unstable;
   PencilOptions pencil{}; // listed by themselves
 };
