@@ -175,7 +175,8 @@ MeshError on_finer_model(const SlidingPoint& point, const Model& fine, const Pro
   MeshError result;
   result.dofs = entry_count(fine.structure.load);
   result.outcome = {OutcomeKind::not_converged, "no equilibrium was found on the finer mesh", 0, 0};
-  Equilibrium equilibrium = find_equilibrium(fine.structure, fine.interface, options.equilibrium);
+  const StageRunner within = [](Stage, const std::function<bool()>& work) { return work(), std::string{}; };
+  Equilibrium equilibrium = std::move(find_sliding(fine, options, within).equilibrium);
   if (equilibrium.outcome.kind != OutcomeKind::converged) return result;
   const Prolongation prolong(*point.model, fine);
   if (!prolong.is_nested()) return skipped("gmsh made another mesh of the geometry the second time");

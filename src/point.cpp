@@ -107,11 +107,12 @@ namespace
 {
 
 /// Where there is no equilibrium: whether there is one without friction, which tells loads from friction. Collective.
-std::string cause_of_none(const Model& model, const Outcome& outcome, const EquilibriumOptions& options)
+std::string cause_of_none(const Model& model, const Outcome& outcome,
+                          const std::function<Equilibrium(const Interface&)>& equilibrium)
 {
   Interface smooth = sharing(model.interface);
   smooth.friction = PairFriction(FrictionLaw{});
-  const bool stands = find_equilibrium(model.structure, smooth, options).outcome.kind == OutcomeKind::converged;
+  const bool stands = equilibrium(smooth).outcome.kind == OutcomeKind::converged;
   return outcome.reason + (stands ? "; without friction there is an equilibrium: friction is too large"
                                   : "; nor is there one without friction: a load pulls a body away from what holds it, "
                                     "or a support is missing");
@@ -122,11 +123,11 @@ std::string cause_of_none(const Model& model, const Outcome& outcome, const Equi
 SlidingPoint find_sliding(const Model& model, const ProgramOptions& options, const StageRunner& run)
 {
   SlidingPoint point{&model, {}, {}, {}, {}, {}};
-  point.equilibrium =
-      run_stage(run, Stage::equilibrium, "",
-                [&] { return find_equilibrium(model.structure, model.interface, options.equilibrium); });
+  const auto at = [&](const Interface& interface)
+  { return find_equilibrium(model.structure, interface, options.equilibrium); };
+  point.equilibrium = run_stage(run, Stage::equilibrium, "", [&] { return at(model.interface); });
   if (Outcome& outcome = point.equilibrium.outcome; outcome.kind == OutcomeKind::no_equilibrium)
-    outcome.reason = cause_of_none(model, outcome, options.equilibrium);
+    outcome.reason = cause_of_none(model, outcome, at);
   return point;
 }
 
@@ -137,7 +138,7 @@ SlidingPoint with_small_motions(SlidingPoint point, const Scene& scene, const Pr
                           [&]
                           {
                             if (point.equilibrium.outcome.kind == OutcomeKind::converged)
-                              point.linearised = linearise(point.sliding());
+                              point.linearised = linearise(point.sliding()); // friction enters C and K
                             return modes_at(point, scene, options.modes);
                           });
   if (const std::string off = why_off(Stage::estimate, point, scene); !off.empty())

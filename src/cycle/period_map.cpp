@@ -32,7 +32,7 @@ double step_for(const PeriodMap& map, double period)
 constexpr double neglected = 1e-2; // of what a period moves, by its contact
 
 /// The contact tolerance of a period with its rate, a part of the largest reaction. An error of it in every step moves
-/// the end of the period by about as much, and a period of shooting lowers the residual by less than a hundred times.
+/// the end of the period by about as much. A period of shooting lowers the residual by less than a hundred times.
 /// Passes to less than `loosest` take no time.
 double contact_tolerance_for(const PeriodMap& map)
 {
@@ -97,20 +97,21 @@ void integrate_once(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
   set_step(map, rate ? step_for(map, period) : period / map.steps);
   if (rate) map.step.contact.tolerance = contact_tolerance_for(map);
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
-  StepWork work = begin_steps(map.step, structure, interface, state);
   if (rate) begin_record(map, start);
-  for (int i = 0; i < map.steps; ++i)
+  const auto after = [&, done = 0](const StepReport& report, const StepWork&) mutable
   {
-    work.record = rate ? &map.records[static_cast<std::size_t>(i)] : nullptr;
-    if (rate && i + 1 == map.steps)
+    if (rate && ++done + 1 == map.steps)
     {
       check(VecCopy(state.u, displacement(rate)));
       check(VecCopy(state.v, velocity(rate)));
     }
-    if (!advance(map.step, structure, interface, work, state).contact_converged) ++map.unconverged;
+    map.unconverged += !report.contact_converged;
     end_if_asked(comm_of(structure.load));
-  }
-  work.record = nullptr;
+    return true;
+  };
+  StepWatch watch{{}, {}, after};
+  if (rate) watch.records = map.records;
+  StepWork work = take_steps(map.step, structure, interface, state, map.steps, watch);
   check(VecCopy(state.u, displacement(end)));
   check(VecCopy(state.v, velocity(end)));
   if (!rate) return;
@@ -167,7 +168,9 @@ void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& gri
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
   if (grid.shift > 0) move_by_part(map, grid.shift, state);
   map.recorded_start = {};
-  map.records = record_steps(map.step, map.sliding.structure, map.sliding.interface, state, steps);
+  map.records = std::vector<StepRecord>(static_cast<std::size_t>(steps));
+  const auto after = [&](const StepReport&, const StepWork&) { return end_if_asked(comm_of(start)), true; };
+  take_steps(map.step, map.sliding.structure, map.sliding.interface, state, steps, {map.records, {}, after});
   if (grid.shift > 0 || steps != map.steps) return;
   map.recorded_start = copy_of(start);
   map.recorded_step = map.step.h;

@@ -191,8 +191,8 @@ void prepare(ReducedMap& map, double period)
 namespace
 {
 
-/// b of w = W r + b without past sliding, of b = G v_free: normal rows are gap rates (g0 + G_n q~)/h + G_n v_free, q~ =
-/// q + h (1-theta) v, tangential ones sliding velocities.
+/// b of w = W r + b without past sliding, from b = G v_free. Normal rows are gap rates (g0 + G_n q~)/h + G_n v_free, q~
+/// = q + h (1-theta) v; tangential ones are sliding velocities.
 VectorXd free_contact_velocity(const ReducedMap& map, const ReducedContact& contact, VectorXd b)
 {
   const ReducedModel& model = map.model;
@@ -282,7 +282,7 @@ bool advance(const ReducedMap& map, ReducedState& state, ReducedContact& contact
 namespace
 {
 
-/// N steps from `state` on.
+/// The one loop over time of the reduced model: N steps from `state` on.
 void march(ReducedMap& map, ReducedState& state, ReducedContact& contact,
            const std::function<void(const ReducedState&)>& watch)
 {
@@ -303,6 +303,24 @@ ReducedState integrate(ReducedMap& map, double period, ReducedState state,
   ReducedContact contact{map.reactions};
   march(map, state, contact, watch);
   return state;
+}
+
+std::vector<StepRecord> record_contacts(ReducedMap& map, double period, ReducedState state)
+{
+  prepare(map, period);
+  share_state(state, map.comm);
+  std::vector<StepRecord> records;
+  ReducedContact contact{map.reactions};
+  const auto add = [&](const ReducedState&)
+  {
+    StepRecord& record = records.emplace_back();
+    record.reactions.assign(contact.r.begin(), contact.r.end());
+    record.contact_velocity.assign(contact.w.begin(), contact.w.end());
+    for (std::size_t pair = 0; pair < map.model.active.size(); ++pair)
+      record.opposes_theta.push_back(!opposes_end(PairView<const double>(contact.past, map.model.directions), pair));
+  };
+  march(map, state, contact, add);
+  return records;
 }
 
 PeriodEnd end_of_period(ReducedMap& map, double period, ReducedState state)

@@ -137,23 +137,6 @@ std::vector<Index> rows_held(const ReducedModel& model, std::span<const StepReco
 
 } // namespace
 
-std::vector<StepRecord> record_contacts(ReducedMap& map, double period, ReducedState state)
-{
-  prepare(map, period);
-  share_state(state, map.comm);
-  std::vector<StepRecord> records(static_cast<std::size_t>(map.steps));
-  ReducedContact contact{map.reactions};
-  for (StepRecord& record : records)
-  {
-    if (!advance(map, state, contact)) ++map.unconverged;
-    record.reactions.assign(contact.r.begin(), contact.r.end());
-    record.contact_velocity.assign(contact.w.begin(), contact.w.end());
-    for (std::size_t pair = 0; pair < map.model.active.size(); ++pair)
-      record.opposes_theta.push_back(!opposes_end(PairView<const double>(contact.past, map.model.directions), pair));
-  }
-  return records;
-}
-
 std::vector<StepRecord> recorded_contacts(const ReducedModel& model, int directions,
                                           std::span<const StepRecord> records)
 {

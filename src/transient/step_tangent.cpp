@@ -194,20 +194,6 @@ void one_step(const RecordedStep& of, std::span<TangentColumn> columns, TangentW
 
 } // namespace
 
-std::vector<StepRecord> record_steps(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                                     State& state, int steps)
-{
-  std::vector<StepRecord> records(static_cast<std::size_t>(steps));
-  StepWork work = begin_steps(step, structure, interface, state);
-  for (StepRecord& record : records)
-  {
-    work.record = &record;
-    (void)advance(step, structure, interface, work, state);
-    end_if_asked(comm_of(structure.load));
-  }
-  return records;
-}
-
 void advance_tangents(const ThetaStep& step, const Structure& structure, const Interface& interface,
                       std::span<const StepRecord> records, std::span<TangentColumn> columns)
 {

@@ -317,4 +317,19 @@ StepReport advance(const ThetaStep& step, const Structure& structure, const Inte
   return report;
 }
 
+StepWork take_steps(const ThetaStep& step, const Structure& structure, const Interface& interface, State& state,
+                    long steps, const StepWatch& watch)
+{
+  StepWork work = begin_steps(step, structure, interface, state);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(steps); ++i)
+  {
+    work.record = i < watch.records.size() ? &watch.records[i] : nullptr;
+    const StepFactors factors = watch.factors ? watch.factors(state.time) : StepFactors{};
+    const StepReport report = advance(step, structure, interface, work, state, factors);
+    if (watch.goes_on && !watch.goes_on(report, work)) break;
+  }
+  work.record = nullptr;
+  return work;
+}
+
 } // namespace squeal

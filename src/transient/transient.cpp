@@ -245,13 +245,8 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
   };
   if (checkpoint && restore(name_of_checkpoint, comm, described) && rank_of(comm) == 0)
     std::printf("  goes on from the checkpoint after %ld of %ld steps\n", summary.steps, steps);
-  StepWork work = begin_steps(step, structure, interface, state);
-  while (summary.steps < steps)
+  const auto after = [&](const StepReport& report, const StepWork& work)
   {
-    const auto next = static_cast<std::size_t>(summary.steps);
-    work.record = next < records.size() ? &records[next] : nullptr;
-    const StepFactors factors = ramps ? step_factors(*ramps, step, state.time) : StepFactors{};
-    const StepReport report = advance(step, structure, interface, work, state, factors);
     ++summary.steps;
     if (!report.contact_converged && summary.unconverged++ == 0) summary.first_unconverged = state.time;
     summary.contact_residual_max = std::max(summary.contact_residual_max, report.contact_residual);
@@ -265,11 +260,14 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     record(report, step.h, state, interface.directions, probe_values, recorder);
     history.fluctuating_energy.push_back(energy(fluctuation, state, work));
     if (monitor) monitor(state, report, work);
-    if (!std::isfinite(report.energy)) break;
+    if (!std::isfinite(report.energy)) return false;
     summary.interrupted = end_is_asked(comm) && summary.steps < steps;
-    if (summary.interrupted) break;
-    if (checkpoint && checkpoint_is_due()) keep(name_of_checkpoint, comm, described);
-  }
+    if (!summary.interrupted && checkpoint && checkpoint_is_due()) keep(name_of_checkpoint, comm, described);
+    return !summary.interrupted;
+  };
+  StepWatch watch{records, {}, after};
+  if (ramps) watch.factors = [&](double time) { return step_factors(*ramps, step, time); };
+  (void)take_steps(step, structure, interface, state, steps - summary.steps, watch);
   if (checkpoint && (summary.interrupted || checkpoint_is_worth_it(comm))) keep(name_of_checkpoint, comm, described);
   summary.contact_iterations_mean = iterations / static_cast<double>(std::max(summary.steps, 1L));
   return summary;

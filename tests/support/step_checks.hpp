@@ -68,7 +68,8 @@ inline void check_tangent(const SmallModel& model, const TangentCase& start)
 {
   const ThetaStep step = make_theta_step(model.structure, model.interface, start.h, 0.5, tight_contact());
   State state = state_of(model.structure, start.u, start.v);
-  const std::vector<StepRecord> records = record_steps(step, model.structure, model.interface, state, start.steps);
+  std::vector<StepRecord> records(static_cast<std::size_t>(start.steps));
+  take_steps(step, model.structure, model.interface, state, start.steps, {records});
   const std::vector<double> nothing(start.u.size(), 0.);
   const Mat K = model.structure.K;
   std::vector<TangentColumn> columns(2);

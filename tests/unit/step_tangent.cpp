@@ -73,7 +73,8 @@ Run run(const SmallModel& model, const State& start, double h, double theta, int
   options.contact.tolerance = 1e-13;
   const ThetaStep step = make_theta_step(model.structure, model.interface, h, theta, options);
   Run result{copy_of(start), {}, {}};
-  result.records = record_steps(step, model.structure, model.interface, result.end, steps);
+  result.records.resize(static_cast<std::size_t>(steps));
+  take_steps(step, model.structure, model.interface, result.end, steps, {result.records});
   for (const StepRecord& record : result.records)
     result.statuses.push_back(contact_status(model.interface, record.reactions, record.contact_velocity));
   return result;

@@ -147,6 +147,19 @@ struct StepReport
 StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
                    State& state, const StepFactors& factors = {});
 
+/// The observers of a march: records to be filled, factors at a time [s], and whether it goes on after a step; the last
+/// two may be empty.
+struct StepWatch
+{
+  std::span<StepRecord> records{};
+  std::function<StepFactors(double time)> factors{};
+  std::function<bool(const StepReport&, const StepWork&)> goes_on{};
+};
+
+/// The one loop over time of the full model: at most `steps` steps in place. Collective.
+StepWork take_steps(const ThetaStep& step, const Structure& structure, const Interface& interface, State& state,
+                    long steps, const StepWatch& watch);
+
 // The exact tangent of theta steps along a recorded motion (src/README.md, section 4.13).
 //
 // Statuses, friction directions and reactions are those of the record, so that a step is a linear map without contact
@@ -161,26 +174,15 @@ struct TangentColumn
   double friction = 0; // change of the friction law's coefficient in every step
 };
 
-/// The records of `steps` steps made in place. Collective. The state becomes that at their end.
-std::vector<StepRecord> record_steps(const ThetaStep& step, const Structure& structure, const Interface& interface,
-                                     State& state, int steps);
-
 /// From changes at the start of the recorded steps to those at their end, in place. Collective.
 void advance_tangents(const ThetaStep& step, const Structure& structure, const Interface& interface,
                       std::span<const StepRecord> records, std::span<TangentColumn> columns);
 
-// When theta and the step size h would show a wrong growth (src/README.md, sections 4.10, 4.11). In sliding an
-// eigenvalue lambda is marched as
-//     lambda_h = ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h,   Re(lambda_h) = 0 where
-//     2 Re(lambda) = (2 theta - 1) h |lambda|^2:
-// - theta > 1/2 with fewer than 2 pi (theta - 1/2) |lambda|^2/(omega sigma) steps a period: what grows looks stable;
-// - theta < 1/2 with fewer than 2 pi (1/2 - theta) |lambda|^2/(omega sigma): most of the growth is the scheme's own;
-// - theta < 1/2 also amplifies every stable mode with -Re(lambda) < (1/2 - theta) h |lambda|^2, up to the highest one
-//   of the mesh. No run is refused for it: the march says so, and ends where its energy is no longer finite.
-// - friction falls with the speed so steeply that a step may have several solutions. The largest eigenvalue of |mu'|
-//   diag(r_n0) W_tt, at rest, is not below 1. W holds h, so that enough steps bring it below. Ramps raise mu and r_n0
-//   by the largest product of their factors.
-// All refusals are lifted by StepOptions::refuse.
+// Refusals of a theta and a step size h that would show a wrong growth (src/README.md, sections 4.10, 4.11).
+// StepOptions::refuse lifts all. A theta < 1/2 also amplifies every stable mode with -Re(lambda) < (1/2 - theta) h
+// |lambda|^2, up to the highest one of the mesh. No run is refused for it: the march says so, and ends where its energy
+// is no longer finite. Where friction falls steeply with the speed W holds h, so that enough steps lead to one
+// solution.
 
 /// ln[(1 + (1-theta) lambda h)/(1 - theta lambda h)]/h [1/s]. lambda in [1/s], h in [s]. Not collective.
 std::complex<double> discrete_eigenvalue(std::complex<double> lambda, double theta, double h);
