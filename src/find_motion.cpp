@@ -85,9 +85,9 @@ UnstableModes modes_sought(const MotionSearch& search)
   return {followed_modes(point, search.scene), point.estimates};
 }
 
-/// The start of the search for a cycle: what the motion has settled on; the orbit of the checkpoint; the state that the
-/// scene names, a file or the end of the transient; beside the equilibrium where it only diverges; else the unstable
-/// modes at the amplitudes of their estimates. Nothing where contact limits none of these.
+/// The start of the search for a cycle: the settled motion, the checkpoint's orbit, the scene's state (a file or the
+/// transient's end), or, where modes only diverge, a state beside the equilibrium. Else the unstable modes at their
+/// estimates' amplitudes; nothing where contact limits none.
 std::optional<GivenStart> cycle_start(const MotionSearch& search, const CycleSettings& settings)
 {
   const auto copied = [](const GivenStart& known) {
@@ -230,8 +230,8 @@ void seek_from_start(MotionSearch& search, const char* name)
     take(seek_cycle(search, name, search.scene.cycle), search.found);
 }
 
-/// Whether the search for a cycle ended without one that attracts, on a free motion that goes on: beside an equilibrium
-/// that is unstable it grows again from however little is left.
+/// Whether the search for a cycle ended without one that attracts, on a free motion that goes on. Beside an unstable
+/// equilibrium it grows again from however little is left.
 bool motion_goes_on(const LimitCycle& cycle, int unstable)
 {
   return cycle.free.state.get() && (cycle.outcome.kind != OutcomeKind::collapsed_to_equilibrium || unstable > 0);
@@ -336,9 +336,9 @@ bool is_open(const Motion& motion)
 
 constexpr int finest = 1024; // steps a period
 
-/// Whether more steps a period may change the answer: where "auto" chooses them and a settled motion at these is
-/// affordable, until a motion that settled on no cycle does as it did at the steps before. The grid of time alone can
-/// make a motion of impacts wander; it then diverges by the step, not by the period.
+/// Whether more steps a period may change the answer. "auto" must choose them, and a settled motion must be affordable,
+/// until a motion without a cycle does as it did at the steps before. The grid of time alone can make a motion of
+/// impacts wander; it then diverges by the step, not by the period.
 bool steps_may_decide(const MotionSearch& search)
 {
   constexpr double of_settling = 512; // periods

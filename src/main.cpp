@@ -241,9 +241,9 @@ void print_error(int rank, const std::exception& error)
 }
 
 /// Without a launcher Open MPI would start a daemon beside this process, for processes that it may start: a third of
-/// the time that a start takes. It would also make a folder inside one that all runs of a machine share, and that the
-/// last of them removes: in about one start of a thousand while another makes its own there, which fails. It takes
-/// settings of its own from the environment alone, before MPI is up.
+/// the time that a start takes. It would also make a folder inside one that all runs of a machine share and the last of
+/// them removes. About one start of a thousand fails by that. It takes settings of its own from the environment alone,
+/// before MPI is up.
 void stay_alone()
 {
   if (!launched_rank().empty()) return;

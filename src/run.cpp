@@ -139,7 +139,7 @@ ExitCode run(Scene scene, const ProgramOptions& options, ResultsFolder& results,
   report.place = results.place();
   const StageRunner runner = [&](Stage which, const std::function<bool()>& work)
   { return run_or_leave_out(report, which, comm, work); };
-  Model model;
+  Model model; // of the scene: scene/*_keys.cpp bind each key to its member, with what it changes
   if (!runner(Stage::model, [&] { return model = build_model(scene, comm), false; }).empty()) throw Interrupted{};
   report.model = summary_with_doubts(model, scene, comm);
   print_model(report.model, comm);

@@ -1,7 +1,6 @@
 #pragma once
-/// Words of the command line, looked through before PETSc starts: arguments that are squeal's own, tools, and options
-/// of PETSc's database with those of PETSC_OPTIONS, since PETSc ends the process at the first value that it does not
-/// take.
+/// Words of the command line, read before PETSc starts: squeal's own arguments, tools, and options of PETSc's database
+/// with those of PETSC_OPTIONS. PETSc itself would end the process at the first value that it does not take.
 #include "squeal/base/run_control.hpp"
 #include "squeal/scene/described.hpp"
 

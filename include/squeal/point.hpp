@@ -67,9 +67,9 @@ std::string no_mode_to_follow(const SlidingPoint& point, const Scene& scene);
 /// Whether a stage of the scene needs the modes.
 bool seeks_modes(const Scene& scene);
 
-/// The number of starts whose motions are sought, as many as the scene asks for; else one for each of several modes
-/// that oscillate and grow, for their pairs and random sums, beside a small motion; beside stable sliding where
-/// friction falls with the speed, for the mode and random sums. Where that costs little, else nothing: none are.
+/// The number of starts whose motions are sought: that of the scene. Else, where it costs little, each of several
+/// growing modes, their pairs, random sums and a small motion; beside stable sliding with falling friction the mode and
+/// random sums. Nothing: none are sought.
 std::optional<int> starts_sought(const SlidingPoint& point, const Scene& scene);
 
 /// Why a stage is off; empty where the scene asks for it, or the point does. `point`: as far as the stages before know

@@ -35,8 +35,8 @@ void set_column(MultiVector& X, Index j, Vec x)
   check(VecRestoreArrayRead(x, &values));
 }
 
-/// A X by one column after the other: of a dense A, or of so few columns that to exchange them together, which takes a
-/// dozen messages to prepare, costs more than to read A again.
+/// A X column by column, for a dense A or for few columns. Then an exchange of them together, which takes a dozen
+/// messages to prepare, costs more than to read A again.
 void multiply_few(Mat A, const MultiVector& X, MultiVector& Y)
 {
   const Owned<Vec> x = vector_of_columns(A), y = vector_of_rows(A);

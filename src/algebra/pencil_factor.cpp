@@ -2,9 +2,9 @@
 /// Every call is collective of its ranks. Its INFOG is the same on all of them, so that errors are thrown together.
 ///
 /// A factor of moderate size is made whole by every rank, each of which solves its part of the right-hand sides. Shared
-/// by ranks, MUMPS adds up in the order in which messages arrive: results would change in rounding from run to run, and
-/// a restarted run would not give the straight run's numbers. A larger factor is shared, with the right-hand sides and
-/// solutions on rank 0.
+/// by ranks, MUMPS adds up in the order in which messages arrive. Rounding would then differ from run to run, and
+/// between a restarted run and a straight one. A larger factor is shared, with the right-hand sides and solutions on
+/// rank 0.
 #include "squeal/algebra/shift_invert.hpp"
 
 #include "squeal/base/broadcast.hpp"

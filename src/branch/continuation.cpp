@@ -164,7 +164,7 @@ void end_at_hopf(BranchSide& side)
   side.events.push_back(hopf_beyond(side.orbits[side.orbits.size() - 2], side.orbits.back()));
 }
 
-/// Whether the last orbits shrink, to a tenth of the start: the parameter is then within 1e-2 of its change to Hopf,
+/// Whether the last orbits shrink, to a tenth of the start. The parameter is then within 1e-2 of its change to Hopf,
 /// and orbits of all sizes nearly solve the same equations.
 bool shrinks_to_a_point(const BranchSide& side)
 {
@@ -285,8 +285,8 @@ Branch joined(BranchSide backward, BranchSide forward)
   return branch;
 }
 
-/// Drops neighbouring folds that are no further apart than the residual, as a part of the range, leaves a parameter
-/// unknown: a branch of hardly any amplitude turns by that much.
+/// Drops neighbouring folds that are no further apart than the residual, a part of the range, leaves the parameter
+/// unknown. A branch of hardly any amplitude turns by that much.
 void drop_folds_of_residuals(const ContinuationSettings& settings, std::vector<BranchEvent>& events)
 {
   const double unknown = settings.tolerance * (settings.greatest - settings.least);

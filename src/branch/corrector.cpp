@@ -301,8 +301,8 @@ bool alike(const BranchPoint& a, const BranchPoint& b)
   return moves(a.measures) == moves(b.measures) && (a.measures.stick_steps > 0) == (b.measures.stick_steps > 0);
 }
 
-/// How far beyond the middle one of three orbits the parameter may turn, where either side bends towards its turn: the
-/// line of each side goes on to the other one's end.
+/// The part of the parameter beyond the middle of three orbits where it may turn, with both sides bent towards the
+/// turn. The line of each side is continued to the other one's end.
 double rise_to_corner(const BranchCorrector& corrector, const std::array<const BranchPoint*, 3>& orbits)
 {
   const double before = distance(corrector, *orbits[0], *orbits[1]),

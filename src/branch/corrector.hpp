@@ -69,8 +69,8 @@ struct KnownBeyond
 std::array<KnownBeyond, 2> known_beyond(const Multipliers& start);
 
 /// The event by which the last of a side's orbits has another number of multipliers beyond the unit circle than is
-/// known, whatever their bars: where |m| = 1, by what the bars leave of it. None where the number may be the same, or
-/// where multipliers only met on the real axis.
+/// known. It is where |m| = 1, as far as the bars tell. None where the number may be the same, or where multipliers
+/// only met on the real axis.
 std::optional<BranchEvent> crossing_among(BranchCorrector& corrector, const std::vector<BranchPoint>& orbits,
                                           KnownBeyond& known);
 

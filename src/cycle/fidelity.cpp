@@ -90,8 +90,8 @@ struct FineShooting
     return shoot_to(accuracy / 2, cycle.orbit.state, cycle.orbit.period, cycle.convergence);
   }
 
-  /// Whether a motion that starts on the cycle leaves it at `steps` steps a period: in the end it comes back less near
-  /// than at first, and not as near as motions beside a cycle are watched. Adds its periods.
+  /// Whether a motion that starts on the cycle leaves it at `steps` steps a period. It then comes back less near than
+  /// at first, and less near than motions beside a cycle are watched. Adds its periods.
   bool is_left(LimitCycle& cycle, int steps)
   {
     constexpr int seen = 20;
@@ -160,8 +160,8 @@ void take(LimitCycle finer, const RelativeChange& step_errors, FittedCycle& foun
 }
 
 /// From the cycle at few steps a period to twice as many and on. Where the cycles agree, so must the last one on a
-/// moved grid: those of several numbers of steps may agree by chance. Where the steps of the iteration are exact, four
-/// times as many steps a period must know the cycle, too: at fewer a grid may hold a cycle that attracts nothing else.
+/// moved grid: those of several numbers of steps may agree by chance. Where the iteration's steps are exact, the cycle
+/// must exist at four times the steps a period, too: a coarse grid alone may hold one.
 void refine(FineShooting& shooting, FittedCycle& found)
 {
   constexpr int most_tries = 6;

@@ -65,9 +65,8 @@ void describe_model(ReducedSearch& search)
                               !std::binary_search(search.active.begin(), search.active.end(), pair);
 }
 
-/// [Hz] up to which real modes join. On the brake of 33 224 degrees of freedom those from 3 to 4.5 times the frequency
-/// save 6 periods of 17 at 64 steps and cost what 18 do. At 128, where a period costs twice as much, they save 10 of 26
-/// to 1e-8, and the whole run takes 8 % longer.
+/// [Hz] up to which real modes join. Those from 3 to 4.5 times the frequency save a third of the periods of the full
+/// model. They cost more than that where periods are dear but short.
 double highest_joining(const ReducedSearch& search)
 {
   constexpr int long_period = 128; // steps

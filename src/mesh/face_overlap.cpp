@@ -212,8 +212,8 @@ bool oppose(const SlaveInPlane& slave, const PlacedFace& master, const NodePosit
 
 } // namespace
 
-/// A Bernstein polynomial of degree 2 at a node is the chance that two corners, drawn from those that the node is in
-/// the middle of, have the polynomial's node in their middle.
+/// A Bernstein polynomial of degree 2 at a node is a chance: two corners are drawn from those around the node, and the
+/// polynomial's node is in their middle.
 const FaceMatrix& multiplier_factors(Shape shape)
 {
   static const auto all = []

@@ -72,7 +72,7 @@ Rule collapsed(Rule rule, Eigen::Index along, std::initializer_list<Eigen::Index
 }
 
 /// The product rule of n points a direction. It is exact to degree 2 n - 1 on boxes, 2 n - 2 on triangles and 2 n - 3
-/// on tetrahedra; on pyramids for r^a s^b t^k of shapes.cpp with a, b and k + 2 up to 2 n - 1.
+/// on tetrahedra. On pyramids it is for r^a s^b t^k of shapes.cpp with a, b and k + 2 up to 2 n - 1.
 Rule product_rule(Shape shape, int n)
 {
   const int corners = corner_count(shape), dimension = dimension_of(shape);

@@ -1,7 +1,7 @@
 #pragma once
-/// The keys of a scene file as a tree: each is bound to the member that it fills, or to tables of further keys, with
-/// its unit, rule, meaning and effect on the model. Reading, range checks, the resolved text, the numbers of studies
-/// and the page of keys all go through this tree.
+/// The keys of a scene file as a tree. Each is bound to its member, or to tables of further keys, with unit, rule,
+/// meaning and effect on the model. Reading, range checks, the resolved text, the numbers of studies and the page of
+/// keys all go through this tree.
 #include "squeal/scene/described.hpp"
 
 namespace squeal

@@ -158,8 +158,8 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
                                   [](const MeanValue& one) { return std::abs(one.value) <= together * one.error; });
   if (positive > 0) return judge_irregular(energies);
   const bool one_frequency = base.second == 0 || base.closes_after > 0;
-  // slow motions that die out have exponents within their bars of zero, too; of a torus whose parts hardly know of each
-  // other the energies are as steady, and the second frequency tells
+  // slow motions that die out have exponents within their bars of zero, too; a torus of hardly coupled parts has as
+  // steady energies, and the second frequency tells
   if ((zero == 1 && (base.second == 0 || parted(exponents, together))) ||
       (zero > 0 && steady(energies, base.closes_after) && one_frequency))
     return {MotionKind::periodic, "", ""};

@@ -269,8 +269,8 @@ MeanValue exponent_by_finer_steps(const Windows& windows, const SettledMotion& m
   return exponents_of(bundle, count / 4, motion.examined.period / windows.length).front();
 }
 
-/// An exponent above zero that four times as many steps change by more than both bars, and by a tenth, is of the grid
-/// of time: masses that contact hits within steps, or feet without mass, scatter a motion that is regular.
+/// An exponent above zero is of the grid of time where four times as many steps change it by more than both bars and a
+/// tenth. Masses that contact hits within steps, or feet without mass, scatter a regular motion.
 void hold_against_finer_steps(const Windows& windows, Vec end, SettledMotion& motion)
 {
   if (motion.examined.verdict.kind != MotionKind::irregular) return;

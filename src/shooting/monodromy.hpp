@@ -60,8 +60,8 @@ struct Completeness
 /// How an orbit lost its stability by this multiplier.
 Crossing crossing_of(std::complex<double> multiplier);
 
-/// The move of this multiplier by a grid of time, as the shift's own misses 1: a grid moves any motion that nothing
-/// else moves, as the phase between parts that do not know of each other. 0 of one that turns.
+/// The move of this multiplier by a grid of time, as the shift's own misses 1. A grid moves any motion that nothing
+/// else holds, such as the phase between uncoupled parts. 0 of one that turns.
 double moved_by_grid(const Multipliers& multipliers, std::complex<double> value);
 
 /// Says what the bars allow.

@@ -24,7 +24,7 @@ using Eigen::MatrixXd;
 using Complex = std::complex<double>;
 
 constexpr double largest_condition = 1e6; // of W'V: beyond, an error of 1e-10 in Z is one of 1e-4 in mu
-// A pass leaves some 0.6 of the error: the pin needed 17. Where periods are dear and the bar holds more, 8 are enough.
+// A pass leaves some 0.6 of the error. Where periods are dear and the bar holds more, 8 are enough.
 constexpr int most_passes = 24, most_dear_passes = 8;
 
 /// The passes: what the last one found of each wanted value, in the order of the reduced model's.
@@ -267,8 +267,8 @@ std::string make_passes(const Monodromy& monodromy, const SlowMotions& slow, Pas
   return {};
 }
 
-/// Removes the shift in time from the pairs. Where it has met another real multiplier in a complex pair, the sum of
-/// both is the pair's: the other one stays, or comes where it was not among the pairs.
+/// Removes the shift in time from the pairs. Where it met another real multiplier in a complex pair, the sum of both is
+/// the pair's. The other one stays, or comes where it was not among the pairs.
 void take_out_shift(Passes& passes)
 {
   const std::size_t place = passes.shift, count = passes.pairs.size();

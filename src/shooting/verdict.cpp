@@ -111,9 +111,9 @@ std::vector<double> distances_beside(const OrbitProblem& problem, ConvergenceLog
   return distances;
 }
 
-/// The first quarter is left out, where other motions decay, and what comes after the bounds: the shift in time that a
-/// motion ends with leaves the flow's direction by its square, and far away growth ends. A motion whose distance
-/// doubles before there is enough for a line has left.
+/// The first quarter, where other motions decay, is left out, and so is all beyond the bounds. There a motion's shift
+/// in time leaves the flow's direction by its square, or growth ends. A motion whose distance doubles before there is
+/// enough for a line has left.
 SeenGrowth growth_of(const BesideMotion& motion, std::vector<double> distances, double residual)
 {
   const double last = std::isfinite(distances.back()) ? distances.back() : motion.highest,
@@ -178,10 +178,10 @@ std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceL
 }
 
 /// The number of periods over which motions beside the orbit are watched: as many as are asked for. Else as many as
-/// make a motion by the tangent four times as large, where the verdict is not "stable" and these are few. Of a whole
-/// matrix that says "stable" as many as show a decay, since a contact that touches and leaves within two steps
-/// forgets when it did; where only the bar of one of its multipliers leaves it open, as many as are affordable or as
-/// the search took.
+/// make a motion by the tangent four times as large, where the verdict is not "stable" and these are few. A whole
+/// matrix that says "stable" takes as many as show a decay: a contact that touches and leaves within two steps forgets
+/// when it did. Where only one multiplier's bar leaves it open, it takes as many as are affordable or as the search
+/// took.
 long watched_periods(const OrbitProblem& problem, const ShootingOptions& options, const ConvergenceLog& log,
                      const Multipliers& multipliers)
 {

@@ -1,6 +1,6 @@
 #pragma once
-/// Contributions, of which the matrices of a structure are the sum, and what each adds to matrices and vectors of the
-/// free degrees of freedom: T_e' A T_e and T_e' f, u_e = T_e q. Sections of bolts; parts that spin in the frame at rest
+/// Contributions to the matrices of a structure, which is their sum. Each adds T_e' A T_e and T_e' f, u_e = T_e q, to
+/// matrices and vectors of the free degrees of freedom. Sections of bolts; parts that spin in the frame at rest
 /// (src/README.md, section 1.10).
 #include "squeal/solid/structure.hpp"
 

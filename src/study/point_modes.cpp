@@ -28,7 +28,7 @@ constexpr std::size_t fewest = 20;   // real modes
 constexpr double waiting_share =
     0.02;                       // directions of corrections below this part of the largest wait for the next pass
 constexpr Index mixtures = 24;  // of the residuals of a side: more directions than that wait for the next pass
-constexpr int most_passes = 20; // corrections of the basis; the first one of a brake may need more than 8
+constexpr int most_passes = 20; // corrections of the basis; the first one may need more than 8
 constexpr double spurious_mode = 1e-8; // backward error of what is no mode
 
 /// The problem at a point on the basis. `kept`: inner products of the shapes without the pivots. `empty`: orthonormal

@@ -171,8 +171,8 @@ private:
     return {threshold_tolerance * size, modes ? std::ssize(at.closed) : 0, most_between};
   }
 
-  /// Follows the modes to a point, with points between where they are unclear, and on both sides of places where pairs
-  /// open or close if a mode is unclear or may change its stability. Seeks the thresholds on the way.
+  /// Follows the modes to a point. Points come between where modes are unclear. They come on both sides of changes of
+  /// contact where a mode is unclear or may change its stability. Seeks the thresholds on the way.
   void advance(Followed& before, Followed& now, int depth, Division& division)
   {
     const bool divisible = std::abs(now.values[0] - before.values[0]) > division.tolerance;
@@ -230,8 +230,8 @@ private:
     return evaluate(between_points(of_line, value));
   }
 
-  /// Whether a mode in the band may become unstable or stable on the way: its growth rate is no farther from zero at
-  /// one of both ends than they are from each other. Any other would need a way of three times that length.
+  /// Whether a mode in the band may change its stability on the way: at one end its growth rate is no farther from zero
+  /// than both are from each other. Any other would need a way of three times that length.
   bool may_change_stability(const Followed& before, const Followed& now, const std::vector<Match>& matches) const
   {
     const std::vector<TwoSidedPair>&from = before.modes.pairs, &to = now.modes.pairs;

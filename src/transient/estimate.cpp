@@ -237,8 +237,8 @@ double quadratic_form(Mat A, const ComplexMode& mode)
   return dot(mode.real, product(A, mode.real)) + dot(mode.imaginary, product(A, mode.imaginary));
 }
 
-// Phase at which the smallest reaction at t = 0, min over pairs of r_n0 + q Re(rho e^{i phase}), is largest; the start
-// is on the mode itself, so rho is the mode's own.
+// The phase at which the smallest reaction at t = 0, min over pairs of r_n0 + q Re(rho e^{i phase}), is largest. The
+// start is on the mode itself, and so is rho.
 double best_phase(const std::vector<PairMotion>& pairs, double q)
 {
   const auto smallest = [&](double phase)

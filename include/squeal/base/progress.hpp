@@ -1,6 +1,6 @@
 #pragma once
-/// Progress of a long stage, printed by rank 0 with the remaining time, as if all parts of the work took as long: a
-/// line at every tenth of the work or every half minute.
+/// Progress of a long stage, printed by rank 0 at every tenth of the work or every half minute. The remaining time
+/// takes all parts of the work as equal.
 #include <chrono>
 #include <mpi.h>
 #include <string>

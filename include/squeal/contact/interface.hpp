@@ -149,8 +149,8 @@ std::vector<double> past_sliding(PairView<const double> velocity, TangentView<co
 /// were any: contact is then to be solved again.
 bool leave_out_where_turned(PairView<const double> r, PairView<const double> w, PairView<double> past);
 
-/// The laws of a solution with this past: pairs that slide on have no level of rest, since the step of slower ones ends
-/// with s+ = -s where friction could hold them.
+/// The laws of a solution with this past. Pairs that slide on have no level of rest: the step of slower ones ends with
+/// s+ = -s where friction could hold them.
 PairFriction sliding_on(const PairFriction& friction, PairView<const double> past);
 
 /// Whether friction of the pair opposes s+.

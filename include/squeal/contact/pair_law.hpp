@@ -133,10 +133,8 @@ inline PairFriction friction_of_some(PairFriction friction, const std::vector<in
 // w_n the gap or its rate, w_t the velocity that friction opposes, mu = mu(|w_t|).
 //
 // The local problem holds all other pairs: find r with w = A r + q, A the pair's own block of W, symmetric and
-// positive semi-definite. It is solved to round-off by cases. Open: q_n >= 0. Stick: A r = -q. Slip: r_t = mu r_n d
-// with a unit d. Then w_n = 0 gives r_n = -q_n / (A_nn + mu A_nt d), and d is a zero of the cross product of d and
-// w_t. That is a trigonometric polynomial of degree two in the angle of d (Bonnefon and Daviet 2011). Newton starts
-// from the last direction; the circle is scanned when that fails.
+// positive semi-definite. It is solved to rounding by the cases of section 4.5. Newton seeks the direction of slip from
+// the last one; the circle is scanned when that fails.
 //
 // Where mu depends on the speed, stick is accepted by mu(0). Slip has the speed v with |w_t| = v at mu(v), which is
 // unique while |mu'| r_n A_tt < 1. In a step w_t is s_theta/theta: `law_of_step` takes mu at s_theta. Of two levels of
@@ -324,9 +322,9 @@ inline CompliantGap compliant_gap(double c, double theta, double h)
 
 // Scales of contact residuals (src/README.md, section 4.6). Arithmetic of one rank.
 
-/// The force that a pair's natural map is compared with [N]: the largest reaction, of its contact or of all, or where
-/// it is smaller the force that would give the pair the largest free velocity `speed`. A light pair beside heavy ones
-/// is then not passed over.
+/// The force that a pair's natural map is compared with [N]: the largest reaction, of its contact or of all. Smaller is
+/// the force that gives the pair the largest free velocity `speed`; it then counts. A light pair beside heavy ones is
+/// then not passed over.
 inline double force_scale(const NaturalScale& rho, double speed, double largest_reaction)
 {
   const double own = speed * std::min(rho.normal, rho.tangential);

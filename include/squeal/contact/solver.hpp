@@ -8,8 +8,7 @@
 /// move are passed over. A large W is swept over through its near field, in single precision, by several ranks side by
 /// side: each then learns what the others changed. One product with W between sweeps and the verdict closes the
 /// residual. Where that does not help, the sweeps read W itself. From the fifth on they are combined (Anderson).
-/// fixed_point: the paper's r_n <- max(0, r_n - rho w_n), r_t <- proj_disc(mu r_n)(r_t - rho w_t). It contracts without
-/// friction for 0 < rho < 2/lambda_max(W), at a rate set by cond(W).
+/// fixed_point: the paper's; without friction it contracts for 0 < rho < 2/lambda_max(W), at a rate set by cond(W).
 ///
 /// Caveat: neither is sure to converge where mu couples sliding and pressure strongly; the result says so.
 #include "squeal/base/petsc.hpp"

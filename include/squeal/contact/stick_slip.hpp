@@ -55,8 +55,8 @@ struct Softening
 /// The factored system of a state on the way. Those of states whose laws differ in few pairs are solved by it.
 struct StatusFactors;
 
-/// The system of the statuses that an increment ended with, factored: with forces p = proj(r - rho w) and their
-/// derivative J, dr = J y + p - r and rho dw = (J - 1) y + p - r fulfil the linearised laws for all y.
+/// The factored system of the statuses that an increment ended with. Forces are p = proj(r - rho w) with the derivative
+/// J: dr = J y + p - r and rho dw = (J - 1) y + p - r fulfil the linearised laws for all y.
 class StatusSystem
 {
 public:

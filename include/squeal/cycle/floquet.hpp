@@ -42,7 +42,7 @@ Verdict examine(const CycleProblem& problem, const CycleOptions& options, const 
 Preconditioner recorded_preconditioner(CycleProblem& problem, PeriodMap& map);
 
 /// Real modes beyond the complex ones, up to a frequency [Hz]. None where the complex ones reach to within a tenth of
-/// it: the end of a band is no sharp bound of what matters, and to seek in so short a band costs two factors.
+/// it. The end of a band is no sharp bound of what matters, and a search in so short a band costs two factors.
 RealModes real_modes_beyond(const CycleProblem& problem, double highest);
 
 } // namespace squeal

@@ -56,8 +56,8 @@ Owned<Mat> damping_of_pairs(const Interface& interface, const std::vector<char>&
 Owned<Mat> friction_damping(const Interface& interface, const std::vector<char>& closed,
                             const std::vector<double>& reactions, FrictionDamping part);
 
-/// The stiffness of the closed pairs with a compliance c: sum B_n' B_n/c, or with the friction that follows the normal
-/// reactions, sum R' B_n/c; and sum B_t' B_t/c_t of those that stick with elastic slip. Null without such pairs.
+/// The stiffness of the closed pairs with a compliance c: sum B_n' B_n/c, or sum R' B_n/c with the friction of the
+/// normal reactions. Those that stick with elastic slip add sum B_t' B_t/c_t. Null without such pairs.
 enum class PairForces
 {
   normal,
@@ -91,8 +91,8 @@ enum class ReactionRows
   tangential, // where there are undriven pairs
 };
 
-/// Reactions [N per m of the motion] that a motion phi e^{s t} takes, whole on every rank: lambda of (s^2 M + s C + K)
-/// phi = R' lambda by the pivots' rows, -B phi/c of rows with a compliance c; 0 on open pairs. Every choice of rows
+/// Reactions [N per m] of a motion phi e^{s t}, whole on every rank. Rigid pairs have the lambda of (s^2 M + s C + K)
+/// phi = R' lambda by the pivots' rows, rows with a compliance c have -B phi/c, open pairs 0. Every choice of rows
 /// agrees if s and phi are an eigenpair. `real`, `imaginary`: of phi. Collective.
 std::vector<std::complex<double>> reactions_of(const SlidingEquilibrium& sliding, const LinearisedSliding& linearised,
                                                ReactionRows rows, std::complex<double> s, Vec real, Vec imaginary);

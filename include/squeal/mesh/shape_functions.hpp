@@ -107,8 +107,8 @@ using Quadrature = std::vector<QuadraturePoint>;
 /// Returns the full integration of the stiffness; it is exact where the Jacobian is constant.
 const Quadrature& stiffness_rule(Shape shape);
 
-/// Returns a rule that is exact for N_i N_j det(J) where the sides are straight, and for N_i times the area vector of a
-/// face, whether its sides are straight or curved.
+/// Returns a rule that is exact for N_i N_j det(J) with straight sides, and for N_i times a face's area vector, with
+/// curved sides too.
 const Quadrature& mass_rule(Shape shape);
 
 /// Returns the rule of 4 x 4 points on the unit triangle, with the functions of a 3-node triangle. It is exact to

@@ -5,11 +5,8 @@
 /// The others, the active ones, keep unilateral contact and Coulomb friction. Then y = V q, V dense:
 ///     M q'' + C q' + K q = H r + f,   f = -H r0,   M = (Y V)'M (Z V) ...,  H = (Y V)'B_a',
 ///     g = g0 + G_n q >= 0,   s = G_t q' - v_d,   G = B_a Z V,
-/// all three matrices unsymmetric. V holds real and imaginary parts of the full problem's complex modes in the band, so
-/// that the reduced model has exactly their growth rates. It holds frictionless real modes above the band and the
-/// attachment shapes of the active pairs,
-///     (K_z + w^2 M_z) X = Z'B_a',   K_z = Z'K Z, w the followed mode's,
-/// orthonormal in the energy of K_z + w^2 M_z; of the attachments what is new above a threshold.
+/// all three matrices unsymmetric. V holds the complex modes of the band, so that the reduced model has exactly their
+/// growth rates, real modes above it, and of the active pairs' attachments (section 7.2) the part that is new.
 ///
 /// An active pair that slides along the drive e throughout has one row and one shape instead of three. They are of B_n'
 /// + mu B_t'e, the normal force with its friction.
@@ -74,9 +71,8 @@ std::vector<int> pairs_that_may_turn(const Interface& interface, const ComplexMo
 
 inline constexpr PetscInt all_attachments = std::numeric_limits<PetscInt>::max();
 
-/// That a model of recorded contact takes at most. It gives a preconditioner, and the vectors that a cycle's
-/// multipliers begin with. Few do: on the brake of 33 224 degrees of freedom all 809 lead to a verdict after 75
-/// columns, 200 after 121 and 80 after 101. The brake of 239 246 needs 82 from 300 of 2997.
+/// The attachments that a model of recorded contact takes at most. It gives a preconditioner, and the vectors that a
+/// cycle's multipliers begin with. Few do: more hardly lower the columns that lead to a verdict.
 inline constexpr PetscInt attachments_on_recorded_contact = 300;
 
 /// How a model is reduced.

@@ -56,7 +56,7 @@ struct ProjectedSliding
   Eigen::MatrixXd M{}, C{}, K{}, K_loss{}; // K_loss is empty without loss factors
 };
 
-/// An equilibrium with its closed pairs taken out, and on the rows of B the damping of the friction direction and S of
+/// An equilibrium with its closed pairs eliminated. On the rows of B are the damping of the friction direction and S of
 /// pairs with a compliance; null where there is none.
 struct LinearisedPoint
 {

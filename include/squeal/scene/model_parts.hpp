@@ -130,8 +130,8 @@ struct Spring
   double damping = 0;      // [N s/m]
 };
 
-/// A joint of two bodies, or of one with the ground, by the motion of `to` relative to `from`, both as rigid bodies
-/// taken to one place: locked motions are a joint, stiffness on the others a bushing.
+/// A joint of two bodies, or of one with the ground. The motion of `to` relative to `from`, both rigid bodies taken to
+/// one place, is locked as in a joint, or has stiffness as in a bushing.
 struct Connector
 {
   std::string from;                // point, rigid body or coupling

@@ -56,8 +56,8 @@ std::vector<SceneComponent> components_of(const Scene& scene);
 /// Names of the contacts: "pad on disc".
 std::vector<std::string> contact_names(const Scene& scene);
 
-/// A number that is zero in the scene, with what it needs to be another one: a first loss factor has to have a
-/// frequency of its equivalent in time, on which modes do not depend.
+/// A number that is zero in the scene, with what it needs to be another one. A first loss factor needs a frequency of
+/// its equivalent in time, on which modes do not depend.
 std::vector<SceneNumber> from_zero(const Scene& scene, const SceneNumber& number);
 
 /// A number as the table of keys describes it.

@@ -45,7 +45,7 @@ struct SettledMotion
   int sampled_steps = 1;               // between two samples of the shapes
 };
 
-/// Whether half as many steps a period change the energy by a fifth, amplitudes by a tenth: the grid of time may then
+/// Whether half as many steps a period change the energy by a fifth or amplitudes by a tenth. The grid of time may then
 /// have a part in the kind of motion. Not collective.
 bool depends_on_steps(const SettledMotion& motion);
 

@@ -89,9 +89,9 @@ BorderedVector step_by_columns(const BorderedSystem& system, const Orbit& orbit,
 /// Twice what the next step from the orbit would change, since the signs of the steps alternate.
 RelativeChange remaining_change(const OrbitProblem& problem, const ShootingOptions& options, const Orbit& orbit);
 
-/// Iterates from `start` until the residual meets the problem's tolerance, or the remaining change its target error:
-/// twice the last step's, or half of the step before if that is more. The ending says whether it did, stalled or
-/// collapsed to the equilibrium.
+/// Iterates from `start` until the residual meets the problem's tolerance, or the remaining change its target error.
+/// The change is twice the last step's, or half of the one before if that is more. The ending says whether it did,
+/// stalled or collapsed to the equilibrium.
 StageResult shoot_once(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, Orbit start);
 
 /// An orbit gone round several times is a solution, too. Where the period over a prime factor of `rounds` nearly closes

@@ -25,10 +25,10 @@ Verdict judge(const OrbitProblem& problem, const ShootingOptions& options, Conve
 /// less energy.
 Owned<Vec> state_beside(const OrbitProblem& problem, const Orbit& orbit, Vec fastest, double part);
 
-/// Decides what is undecided where a motion was seen to grow beyond its own bar, and what only the bar of one
-/// multiplier leaves undecided where it was seen to decay. "Stable" is undecided where one was not seen to decay, and
-/// "unstable" where it was not: where contact only just opens, closes or sticks, the tangent holds in a neighbourhood
-/// that no motion stays in. Not collective.
+/// Decides an open verdict: "unstable" where a motion was seen to grow beyond its own bar, "stable" where one was seen
+/// to decay and only one multiplier's bar held 1. "Stable" is undecided where no motion was seen to decay, "unstable"
+/// where none was seen to grow. Where contact only just opens, closes or sticks, no motion stays where the tangent
+/// holds. Not collective.
 void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers);
 
 /// An orbit that repels is no answer; with other unstable modes the motion need not be periodic at all. Not collective.

@@ -103,8 +103,8 @@ Trajectory integrate(const SlidingEquilibrium& sliding, const ComplexMode* mode,
 
 // Growth of one mode during a transient (src/README.md, section 4.12).
 //
-// In persistent sliding the step is linear and leaves the plane of the mode invariant: (u - u0, v) = Re(q (phi, lambda
-// phi)), and q grows by exp(lambda_h h) a step, lambda_h the discrete eigenvalue. |q| is found by projection in the
+// In persistent sliding the step is linear and leaves the mode's plane invariant: (u - u0, v) = Re(q (phi, lambda
+// phi)). There q grows by exp(lambda_h h) a step, lambda_h the discrete eigenvalue. |q| is found by projection in the
 // energy inner product. Unlike the energy it has no ripple at 2 omega, so its logarithm is a straight line in time.
 // Functions that take matrices or vectors are collective.
 
