@@ -103,13 +103,16 @@ tolerance = 1e-8
 STUCK, MICRO, SLIDING = (2, 20, 20), (1.2, 6, 6), (0.5, 0.15, 0.15)
 
 
+def scene_text(preloads, steps=400, more="", spring=SPRING):
+    nodes = "".join(NODE.format(number=i, force=-p) for i, p in enumerate(preloads, 1))
+    return POINTS.replace("{spring}", spring) + nodes + CYCLE.format(steps=steps) + more
+
+
 @pytest.fixture
 def scene(tmp_path):
-    def write(preloads, steps=400, more="", spring=SPRING):
-        points = POINTS.replace("{spring}", spring)
-        nodes = "".join(NODE.format(number=i, force=-p) for i, p in enumerate(preloads, 1))
+    def write(*given, **more):
         file = tmp_path / "scene.toml"
-        file.write_text(points + nodes + CYCLE.format(steps=steps) + more)
+        file.write_text(scene_text(*given, **more))
         return file
 
     return write
