@@ -264,10 +264,11 @@ PairVector solve_pair(const PairBlock& A, const PairVector& q, int directions, c
 ContactStatus contact_status(const PairVector& r, const PairVector& w, const FrictionLaw& law, double largest)
 {
   if (r[0] <= 0) return ContactStatus::open;
-  const double limit = friction_coefficient(law, 0).value * r[0];
+  const double speed = length(w[1], w[2]), at_rest = friction_coefficient(law, 0).value;
+  // a pair that has just begun to slide has the friction of its speed, however slow it is
+  const double limit = std::min(at_rest, friction_coefficient(law, speed).value) * r[0];
   if (limit - length(r[1], r[2]) <= 1e-8 * largest) return ContactStatus::slip;
-  if (!depends_on_speed(law)) return ContactStatus::stick;
-  return is_at_rest(law, length(w[1], w[2])) ? ContactStatus::stick : ContactStatus::slip;
+  return !depends_on_speed(law) || is_at_rest(law, speed) ? ContactStatus::stick : ContactStatus::slip;
 }
 
 std::vector<ContactStatus> contact_status(PairView<const double> reactions, PairView<const double> w,

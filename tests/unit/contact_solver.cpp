@@ -266,6 +266,17 @@ TEST_CASE("a contact that carries little is judged by what it carries, beside on
         ContactStatus::stick);
 }
 
+TEST_CASE("a pair slips from its first motion on where friction falls with speed")
+{
+  const FrictionLaw law{0.3, true, 0.5, 1};
+  for (const double speed : {1e-6, 1e-7})
+  {
+    const double mu = friction_coefficient(law, speed / 2).value; // a step takes it at half of w_t
+    CHECK(contact_status({1, mu, 0}, {0, -speed, 0}, law, 1) == ContactStatus::slip);
+    CHECK(contact_status({1, 0.49, 0}, {0, -speed, 0}, law, 1) == ContactStatus::stick);
+  }
+}
+
 TEST_CASE("light plates between two bodies take few sweeps")
 {
   // five bodies on each other: W is the difference of their velocities by unit forces, along the normal and the tangent
