@@ -59,8 +59,9 @@ public:
     for (PetscInt i = first; i < last; ++i)
     {
       const PetscInt nodal = dofs.names.nodal_dof[static_cast<std::size_t>(i)];
-      check(VecSetValue(result, i, at(static_cast<std::size_t>(nodal / 6), static_cast<int>(nodal % 6), q),
-                        INSERT_VALUES));
+      const double value = sum_over_parents(static_cast<std::size_t>(nodal / 6), [&](std::size_t parent)
+                                            { return coarse(parent, static_cast<int>(nodal % 6), q); });
+      check(VecSetValue(result, i, value, INSERT_VALUES));
     }
     finish(result);
     return result;
@@ -85,12 +86,6 @@ public:
   }
 
 private:
-  /// Component c of a node of the finer mesh.
-  double at(std::size_t node, int c, const std::vector<double>& q) const
-  {
-    return sum_over_parents(node, [&](std::size_t parent) { return coarse(parent, c, q); });
-  }
-
   /// A value at a node of the finer mesh from those at nodes of the scene's.
   double sum_over_parents(std::size_t node, const auto& value) const
   {
@@ -115,13 +110,6 @@ private:
   std::size_t file_nodes_ = 0; // of the finer mesh
 };
 
-/// An eigenvalue on the finer mesh.
-struct FinerMode
-{
-  std::complex<double> lambda{};        // [1/s]
-  double backward_error = std::nan(""); // NaN: it was not found
-};
-
 MeshError skipped(const std::string& reason)
 {
   MeshError result;
@@ -129,8 +117,9 @@ MeshError skipped(const std::string& reason)
   return result;
 }
 
-/// Finds, for each mode, the mode most like it on the finer mesh with these closed pairs.
-std::vector<FinerMode> find_finer(std::span<const ComplexMode* const> modes, const Prolongation& prolong,
+/// Finds, for each mode, the mode most like it on the finer mesh with these closed pairs; without vectors if there is
+/// none.
+std::vector<Eigenpair> find_finer(std::span<const ComplexMode* const> modes, const Prolongation& prolong,
                                   const SlidingEquilibrium& sliding, const PencilOptions& options)
 {
   constexpr double beside = 1e-4, lowest = 0.5, highest = 1.4; // of the frequency
@@ -140,7 +129,7 @@ std::vector<FinerMode> find_finer(std::span<const ComplexMode* const> modes, con
   const QuadraticProblem problem = sliding_problem(sliding.structure, linearised);
   const Owned<Mat> K_loss = sliding_loss(sliding.structure, linearised);
   ShiftInvert pencil = make_shift_invert(linearised.K_z, linearised.M_z, Keep::factor, options);
-  std::vector<FinerMode> result(modes.size());
+  std::vector<Eigenpair> result(modes.size());
   for (std::size_t k = 0; k < modes.size(); ++k)
   {
     const Owned<Vec> real = prolong(modes[k]->real), imaginary = prolong(modes[k]->imaginary);
@@ -149,7 +138,7 @@ std::vector<FinerMode> find_finer(std::span<const ComplexMode* const> modes, con
     const double square = std::norm(modes[k]->lambda);
     move_to(pencil, (1 + beside) * square);
     // a step of inverse iteration: a prolongation is stiff where the coarse elements were not
-    const QuadraticSolution found =
+    QuadraticSolution found =
         solve_on_subspace(problem, K_loss, pencil.factor->solve(product(linearised.M_z, start)), pencil.factor.get(),
                           {.window = {lowest * lowest * square, highest * highest * square},
                            .passes = passes,
@@ -157,17 +146,30 @@ std::vector<FinerMode> find_finer(std::span<const ComplexMode* const> modes, con
                            .tolerance = 1e-12,
                            .sharp = 1e-13});
     double best = 0;
-    for (const Eigenpair& pair : found.pairs)
+    for (Eigenpair& pair : found.pairs)
     {
       const std::array vector{pair.real.get(), pair.imaginary.get()};
       const Eigen::MatrixXd products = inner_products(columns_of(vector), start);
       const double like = std::hypot(products(0, 0) + products(1, 1), products(0, 1) - products(1, 0));
       if (!(like > best) || !(pair.backward_error < 1e-8)) continue;
       best = like;
-      result[k] = {pair.lambda, pair.backward_error};
+      result[k] = std::move(pair);
     }
   }
   return result;
+}
+
+/// Those that grow, then stable ones of least damping ratio: a finer mesh turns the sign of these first.
+std::vector<const ComplexMode*> modes_at_stake(const Modes& found)
+{
+  constexpr std::ptrdiff_t stable = 2;
+  std::vector<const ComplexMode*> modes;
+  for (const ComplexMode& mode : found.modes)
+    if (mode.frequency_hz() != 0) modes.push_back(&mode);
+  std::ranges::stable_sort(modes, {}, [](const ComplexMode* mode) { return std::max(mode->damping_ratio(), 0.); });
+  const auto growing = std::ranges::count_if(modes, [](const ComplexMode* mode) { return mode->growth_rate() > 0; });
+  modes.resize(std::min(modes.size(), static_cast<std::size_t>(growing + stable)));
+  return modes;
 }
 
 MeshError on_finer_model(const SlidingPoint& point, const Model& fine, const ProgramOptions& options)
@@ -181,33 +183,36 @@ MeshError on_finer_model(const SlidingPoint& point, const Model& fine, const Pro
   const Prolongation prolong(*point.model, fine);
   if (!prolong.is_nested()) return skipped("gmsh made another mesh of the geometry the second time");
   result.outcome = {OutcomeKind::converged, "", 0, 0};
-  std::vector<const ComplexMode*> modes;
-  const auto asked = std::min(point.modes.modes.size(), static_cast<std::size_t>(point.modes.unstable_count) + 1);
-  for (const ComplexMode& mode : std::span(point.modes.modes).first(asked))
-    if (mode.frequency_hz() != 0) modes.push_back(&mode);
+  const std::vector<const ComplexMode*> modes = modes_at_stake(point.modes);
   const SlidingEquilibrium sliding{fine.structure, fine.interface, equilibrium};
-  const std::vector<FinerMode> own = find_finer(modes, prolong, sliding, options.modes.pencil);
+  const std::vector<Eigenpair> own = find_finer(modes, prolong, sliding, options.modes.pencil);
 
   const std::vector<double> before = prolong.pressures(point.equilibrium),
                             now = pressures_of(fine.interface, equilibrium);
   std::vector<char> held, staying; // pairs closed on the scene's mesh; where pressures change once more as they did
+  double open_part = 0;            // of the faces of those that do not stay, at most
   for (std::size_t i = 0; i < now.size(); ++i)
   {
     held.push_back(!std::isnan(before[i]));
-    staying.push_back(equilibrium.closed[i] && 2 * now[i] >= before[i]);
+    const bool opens = equilibrium.closed[i] && 2 * now[i] < before[i];
+    staying.push_back(equilibrium.closed[i] && !opens);
+    // the pressure rises from 2 now - before at the face's edge to now in its middle
+    if (opens) open_part = std::max(open_part, 0.5 * (before[i] - 2 * now[i]) / (before[i] - now[i]));
   }
   const bool has_moved = held != equilibrium.closed;
   const std::vector<char>& closed = has_moved ? held : staying;
-  std::vector<FinerMode> others = own;
+  std::vector<Eigenpair> with_others;
   if (closed != equilibrium.closed)
   {
     equilibrium.closed = closed;
-    others = find_finer(modes, prolong, sliding, options.modes.pencil);
+    with_others = find_finer(modes, prolong, sliding, options.modes.pencil);
   }
+  const std::vector<Eigenpair>& others = with_others.empty() ? own : with_others;
   for (std::size_t k = 0; k < modes.size(); ++k)
   {
-    const double error = std::isnan(others[k].backward_error) ? others[k].backward_error : own[k].backward_error;
-    const std::complex<double> fine_lambda = own[k].lambda, other = others[k].lambda;
+    const double error = own[k].real.get() && others[k].real.get() ? own[k].backward_error : std::nan("");
+    const std::complex<double> fine_lambda = own[k].lambda, change = others[k].lambda - fine_lambda,
+                               other = fine_lambda + (has_moved ? 1 : open_part) * change;
     result.modes.push_back({modes[k]->lambda, fine_lambda, has_moved ? other : fine_lambda, other, error});
     result.outcome.residual = std::max(result.outcome.residual, error);
     if (!result.modes.back().is_known())

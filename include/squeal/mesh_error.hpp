@@ -8,7 +8,8 @@
 /// contact it is below that of the elements, 2 or 4. Orders from 1 on put the limit between lambda(h/2) and lambda(h/2)
 /// + d; the middle is the corrected value. Its bar is half of |d|, and |lambda(h/2) - held| beside it: the border of
 /// the contact falls between nodes as it may, on the finer mesh as on the first. Where both meshes have the same closed
-/// pairs, those take held's place in the bar that open where pressures change once more as they did.
+/// pairs, those that open where pressures change once more as they did take held's place, by the part of their faces
+/// that opens.
 ///
 /// Caveat: a mesh that is too coarse has no order yet. The geometry's own curvature is not found again.
 #include "squeal/options.hpp"
@@ -17,7 +18,7 @@
 namespace squeal
 {
 
-/// The modes on the finer mesh that follow from the unstable ones and from the stable one nearest to growing.
+/// The modes on the finer mesh that follow from the unstable ones and from the two stable ones of least damping ratio.
 /// Collective. outcome: "converged"; "not converged": no equilibrium there, or a mode was not found on it; "skipped".
 MeshError find_mesh_error(const SlidingPoint& point, const Scene& scene, const ProgramOptions& options);
 

@@ -31,8 +31,8 @@ SceneKeys keys_of(ModesSettings& m)
        "(toar)"},
       {"band", &m.band, "Hz", "every mode below is reported", positive},
       {"mesh_error", choice_of(m.mesh_error), "word",
-       "what the mesh leaves open on the unstable modes and the next one: off, or by a model with every element "
-       "divided (refinement), which takes eight times the memory and more"},
+       "what the mesh leaves open on the unstable modes and the two stable ones of least damping ratio: off, or by a "
+       "model with every element divided (refinement), which takes eight times the memory and more"},
   };
 }
 

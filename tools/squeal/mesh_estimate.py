@@ -30,6 +30,7 @@ from squeal.surface import elements as elements_of
 
 CHUNK = 512  # elements at a time
 MODES = 8  # at most so many
+STABLE = 2  # of these, those of least damping ratio
 SURE = 0.1  # part of the eigenvalue's change from which on its phase is sharp enough for the growth rate
 
 
@@ -104,26 +105,22 @@ def scene_of(run: Results) -> dict[str, Any]:
 def mode_vectors(run: Results) -> tuple[list[dict[str, Any]], np.ndarray, list[int]]:
     """The modes that are asked about, their fields (node, 3, field), and the field of each one's left vector or -1."""
     modes = run.stage("modes")["modes"]
-    found, columns, left = [], [], []
-    for number in run.mode_numbers():
-        if number > len(modes) or modes[number - 1]["frequency_hz"] == 0:
-            continue
-        found.append(modes[number - 1] | {"number": number})
-        columns.append(run.shape(number))
-        if not modes[number - 1]["unstable"]:
-            break  # the next stable one
-    for mode in found[:MODES]:
+    there = [modes[number - 1] | {"number": number} for number in run.mode_numbers()
+             if number <= len(modes) and modes[number - 1]["frequency_hz"] != 0]
+    stable = sorted((mode for mode in there if not mode["unstable"]), key=lambda mode: mode["damping_ratio"])
+    found = ([mode for mode in there if mode["unstable"]] + stable[:STABLE])[:MODES]
+    if not found:
+        raise Missing("the run kept no shape of a mode that oscillates: -modes_shapes all keeps those of stable ones too")
+    columns, left = [run.shape(mode["number"]) for mode in found], []
+    for mode in found:
         try:
-            parts = [run.field(f"modes/{mode['number']}/left_{part}") for part in ("real", "imaginary")]
+            real, imaginary = (run.field(f"modes/{mode['number']}/left_{part}") for part in ("real", "imaginary"))
         except Missing:
             left.append(-1)
             continue
-        left.append(len(found[:MODES]) + sum(k >= 0 for k in left))
-        columns.insert(left[-1], parts[0] + 1j * parts[1])
-    if not found:
-        raise Missing("the run kept no shape of a mode that oscillates: -modes_shapes all keeps those of stable ones too")
-    count = len(found[:MODES])
-    return found[:MODES], np.stack(columns[:count] + columns[count : count + sum(k >= 0 for k in left)], axis=-1), left
+        left.append(len(columns))
+        columns.append(real + 1j * imaginary)
+    return found, np.stack(columns, axis=-1), left
 
 
 def damping_of(part: dict[str, Any], scene: dict[str, Any]) -> tuple[float, float]:

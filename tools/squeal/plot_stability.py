@@ -29,6 +29,16 @@ def symlog_ticks(scale, low, high):
     return sorted(set(ticks))
 
 
+def draw_mesh_bars(axes, modes, size):
+    """Where the mesh leads each mode that it was asked about, with the bar of its growth rate."""
+    asked = [mode for mode in modes.get("mesh_error", {}).get("modes", []) if np.isfinite(mode.get("growth_error") or np.nan)]
+    if asked:
+        frequency, growth, bar = (np.array([mode[name] for mode in asked], float)
+                                  for name in ("corrected_frequency_hz", "corrected_growth_rate", "growth_error"))
+        axes.vlines(frequency / size, growth - bar, growth + bar, color="0.3", lw=1.4)
+        axes.plot(frequency / size, growth, "_", ms=9, color="0.3", label="limit of the mesh, with its bar")
+
+
 def draw_modes(runs):
     found = those_with(runs, found_modes)
     largest = max(mode["frequency_hz"] for _, modes in found for mode in modes["modes"])
@@ -44,6 +54,7 @@ def draw_modes(runs):
         for chosen, mark, wide, shade, words in ((~unstable, "o", 4, shades[0], "stable"), (unstable, "^", 8, shades[1], f"unstable, {count}")):
             line, = axes.plot(frequency[chosen] / size, growth[chosen], mark, ms=wide, color=shade, label=label_of(run, runs, words))
             line.of_modes = {"run": run.folder.name, "modes": [int(number) + 1 for number in np.flatnonzero(chosen)]}
+        draw_mesh_bars(axes, modes, size)
         points += [(f / size, g) for f, g in zip(frequency[unstable], growth[unstable])]
         texts += [f"{label_of(run, runs)} {mode_words(f, g)}".strip() for f, g in zip(frequency[unstable], growth[unstable])]
         growths.append(growth)
