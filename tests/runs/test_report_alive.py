@@ -1,9 +1,11 @@
 """What is alive on the page of tools/report: its arrays hold the run's own numbers, its charts those of the pictures."""
 
 import base64
+import html
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -17,9 +19,11 @@ sys.path.insert(0, str(ROOT / "tools"))
 from squeal import plot_basis  # noqa: E402
 from squeal import report_charts  # noqa: E402
 from squeal import report_input  # noqa: E402
+from squeal import report_tables  # noqa: E402
 from squeal import report_view  # noqa: E402
 import squeal  # noqa: E402
 from squeal import surface  # noqa: E402
+from squeal.part_shares import part_shares  # noqa: E402
 from squeal.plot_numbers import axis_label, unit_of_key, words_of  # noqa: E402
 from squeal.plot_places import Place, places_of  # noqa: E402
 
@@ -70,6 +74,25 @@ def test_the_harmonics_of_the_cycle_give_its_motion_again(pin, view):
     lacking = float(re.search(r"lack ([\d.e-]+) %", motion["words"])[1]) / 100
     assert motion["mode"] == 0 and np.linalg.norm(again - moved) <= (1.06 * lacking + 1e-6) * np.linalg.norm(moved)  # two digits are said
     assert lacking < report_view.REST_OF_MOTION
+
+
+@pytest.mark.parametrize("geometry", ["pin.geo", "pin_tetrahedra.geo"])
+def test_the_page_says_which_part_moves_and_how_to_ask_for_the_numbers(tmp_path, geometry):
+    """Shares by the shapes alone are those of the program's own matrices; what is said to ask with does ask."""
+    run = squeal.run(INPUTS / "pin_on_disc", {"mesh.file": geometry, "cycle.enabled": False, "damping.beta": 1e-7}, output=tmp_path / "run")
+    found, text = part_shares(run, 3), report_tables.moving_parts(run)
+    command = shlex.split(html.unescape(re.search("<pre>(.*?)</pre>", text)[1]))
+    words = [word for word in command[1:] if word != "--set"]
+    why = squeal.run(words[0], dict(word.split("=", 1) for word in words[3:]), output=words[2])
+    causes = why.report["sensitivity"]["modes"]
+    assert len(found) == min(3, len(causes)) and {"friction.coefficient", "part.pin.young"} <= {by["key"] for by in causes[0]["derivatives"]}
+    for mode, cause in zip(found, causes):
+        own = {share["name"]: share for share in cause["shares"] if share["table"] == "part"}
+        for energy in ("kinetic", "strain"):
+            held = sum(share[energy] for share in own.values())  # the page's are of solids
+            assert {part["name"]: part[energy] for part in mode["parts"]} == pytest.approx({name: own[name][energy] / held for name in own}, abs=1e-6)
+        assert all(f"{100 * part['kinetic']:.3g}" in text for part in mode["parts"])
+    assert report_tables.moving_parts(why) == ""  # which says more
 
 
 def test_modes_beyond_the_room_are_named(pin):

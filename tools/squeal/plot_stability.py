@@ -67,7 +67,6 @@ def draw_modes(runs):
         axes.set_yscale("symlog", linthresh=scale)
         axes.set_yticks(symlog_ticks(scale, growths.min(), growths.max()))
         axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        axes.set_ylabel("growth rate, logarithmic away from 0 [1/s]")
     axes.margins(y=0.12)
     words = f", {found[0][1]['unstable_count']} unstable of {len(found[0][1]['modes'])}" if len(found) == 1 else ""
     if len(points) > LABELS:

@@ -70,7 +70,11 @@ function scaleOf(axis) {
     const words = new Map(axis.ticks);
     found.afterBuildTicks = scale => { scale.ticks = axis.ticks.map(([value]) => ({ value })); };
     Object.assign(found.ticks, { callback: value => words.get(value) ?? "", autoSkip: false });
-  } else found.ticks.callback = value => !axis.log || Number.isInteger(Number(Math.log10(value).toFixed(9))) ? short(value) : "";
+  } else if (axis.log) {
+    // powers of ten alone; of few of them, their doubles and halves too
+    const first = value => Math.round(value / 10 ** Math.floor(Math.log10(value) + 1e-9));
+    found.ticks.callback = function (value) { return first(value) === 1 || (this.max < 30 * this.min && [2, 5].includes(first(value))) ? short(value) : ""; };
+  } else found.ticks.callback = short;
   return found;
 }
 

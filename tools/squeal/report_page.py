@@ -8,6 +8,7 @@ from pathlib import Path
 from squeal import common
 import numpy as np
 from PIL import Image
+from squeal.part_shares import part_shares
 from squeal.plot_all import ANIMATION, FIGURES, caption_of, figures
 from squeal.plot_basis import frequency_unit, length_unit, names_of
 from squeal.plot_motion import lift_off_of
@@ -17,7 +18,7 @@ from squeal.report_alive import Alive
 from squeal.report_charts import charts_of
 from squeal.report_input import differences, input_of
 from squeal.report_style import STYLE
-from squeal.report_tables import number, numbers, paragraph, probability, rotation, strongest, table, text, values_of
+from squeal.report_tables import SHAPES, number, numbers, paragraph, probability, rotation, strongest, table, text, values_of
 from squeal import Missing
 
 STAGES = ("equilibrium", "modes", "estimate", "response", "transient", "cycle", "settled", "attractors", "branch",
@@ -86,6 +87,7 @@ def facts(run):
         found["unstable modes"] = f"{modes['unstable_count']} of {len(modes['modes'])} below {modes['band_hz'] / size:g} {unit}"
         if first["unstable"]:
             found["fastest growing mode"] = f"{first['frequency_hz']:.5g} Hz, {first['growth_rate']:+.3g} 1/s"
+            found |= moved_most(run)
     if cycle.get("outcome") == "converged":
         found["frequency of the squeal"] = f"{cycle['frequency_hz']:.6g} Hz"
         swings = cycle.get("peak_to_peak", {})
@@ -104,6 +106,15 @@ def facts(run):
         if settled.get("lines"):
             found["strongest line"] = f"{settled['lines'][0]['frequency_hz']:.5g} Hz"
     return found | study_facts(report)
+
+
+def moved_most(run):
+    """The part that has most of that mode's kinetic energy."""
+    found = part_shares(run, SHAPES)
+    if not found or found[0]["mode"] != 1 or len(found[0]["parts"]) < 2:
+        return {}
+    part = found[0]["parts"][0]
+    return {"what moves in that mode": f"{part['name']}, {100 * part['kinetic']:.3g} % of the kinetic energy"}
 
 
 def lost_contact(run):
@@ -209,7 +220,7 @@ def page(runs):
         shown = pictures([run], alive, len(runs))
         parts += [warnings(run), alive.stage() if len(runs) == 1 else "", input_of(run),
                   f'<section><h2>Pictures</h2><div class="pictures">{shown}</div>{sound(run)}</section>',
-                  f"<section><h2>Numbers</h2>{numbers(run.report)}{stages(run)}{again(run)}</section>"]
+                  f"<section><h2>Numbers</h2>{numbers(run)}{stages(run)}{again(run)}</section>"]
     # The policy keeps a browser from asking the network for anything.
     policy = "default-src 'none'; img-src data: blob:; media-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
     return (f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{text(title)}</title>'

@@ -12,6 +12,7 @@ h2.run { margin-top: 2.5rem; border-top: 3px solid var(--blue); padding-top: 0.8
 h3 { margin: 1.6rem 0 0.5rem; font-size: 1.02rem; }
 h4 { margin: 1.1rem 0 0.4rem; font-size: 0.95rem; }
 section p { margin: 0.4rem 0; }
+.wide + h2, p + h2, details + h2 { margin-top: 1.4rem; }
 section { background: var(--paper); border: 1px solid var(--line); border-radius: 6px; padding: 1.1rem 1.2rem; margin: 0 0 1.2rem; }
 .heard { margin: 0 0 1rem; font-size: 1.25rem; line-height: 1.4; }
 .cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(190px, 1fr)); gap: 0.7rem; margin: 0; }
@@ -75,6 +76,9 @@ summary { cursor: pointer; color: var(--blue); }
   h1 { font-size: 1.3rem; }
   .heard { font-size: 1.08rem; }
   section { padding: 0.8rem; }
+  th, td { padding-right: 0.6rem; }
+  td { white-space: normal; }
+  td.words { min-width: 9rem; }
   .pictures, .charts { grid-template-columns: minmax(0, 1fr); }
   figure.broad { grid-column: auto; }
   #view { grid-template-columns: minmax(0, 1fr); }

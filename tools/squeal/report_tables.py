@@ -4,11 +4,14 @@ import html
 
 import numpy as np
 from squeal.common import counted
-from squeal import number_label
+from squeal import Missing, number_label
+from squeal.mesh_estimate import scene_of
+from squeal.part_shares import part_shares
 
 ROWS = 12  # of a table that stand open; the rest is folded away
 WORDS = 40  # letters of a cell that stay on one line
 NUMBERS = 6  # of the scene that are shown for a mode: those that move its growth most
+SHAPES = 6  # unstable modes whose parts are told
 MODES = 3  # unstable modes whose numbers stand open
 FEEDS = {"contact_powers": "", "falling_friction_powers": "falling friction of ", "turning_friction_powers": "turning friction of "}
 CHANGES = {"mass": ("mass", "kg"), "damping": ("dashpot", "N s/m"), "stiffness": ("spring", "N/m")}  # of a [[change]]
@@ -114,6 +117,34 @@ def shares(mode):
     rows = [[text(f"{s['table'].replace('_', ' ')} {s['name']}"), *(number(100 * s[name], 3) if abs(s[name]) >= 5e-4 else "" for name in ("kinetic", "strain"))]
             for s in found]
     return table(["energy is held by", "kinetic [%]", "strain [%]"], rows) if rows else ""
+
+
+def driving_numbers(run):
+    """Those that are asked about first: friction, damping and moduli, where they are not 0."""
+    try:
+        scene = scene_of(run)
+    except Missing:
+        return ["friction.coefficient"]
+    found = [f"{table_of}.{name}" for table_of, name in (("friction", "coefficient"), ("damping", "beta")) if scene.get(table_of, {}).get(name)]
+    return found + [f"part.{part['name']}.young" for part in scene.get("part", []) if part.get("young")]
+
+
+def moving_parts(run):
+    """Which part moves in each unstable mode, of a run that was not asked why they are unstable, and how to ask."""
+    report = run.report
+    if report.get("sensitivity", {}).get("modes") or not report.get("modes", {}).get("unstable_count"):
+        return ""
+    found = part_shares(run, SHAPES)
+    rows = [[number(mode["frequency_hz"], 7), number(mode["growth_rate"]), *("<br>".join(number(100 * part[name], 3) for part in mode["parts"]) for name in ("kinetic", "strain"))]
+            for mode in found]
+    for row, mode in zip(rows, found):
+        row.insert(2, "<br>".join(text(part["name"]) for part in mode["parts"]))
+    head = ["unstable mode [Hz]", "growth rate [1/s]", "part", "kinetic energy [%]", "strain energy [%]"]
+    drivers = driving_numbers(run)
+    ask = (f'build/squeal {run.folder / "resolved.toml"} --output {run.folder}_why --set cycle.enabled=false --set transient.enabled=false '
+           f'--set "sensitivity.numbers={drivers}"')
+    parts = "<h3>Which part moves in unstable modes</h3>" + table(head, rows, "modes that grow more slowly") if rows else ""
+    return parts + (paragraph("Which numbers drive unstable modes, and what each contact feeds in:") + f"<pre>{text(ask)}</pre>" if drivers else "")
 
 
 def what_is_added(change):
@@ -245,5 +276,6 @@ def robustness(report):
             + table(["random number", "distribution", "rank correlation with growth"], drivers, "weaker ones"))
 
 
-def numbers(report):
-    return "".join(part(report) for part in (modes, sensitivity, sweep, robustness, response, contacts, cycle))
+def numbers(run):
+    parts = [part(run.report) for part in (modes, sensitivity, sweep, robustness, response, contacts, cycle)]
+    return "".join([parts[0], moving_parts(run), *parts[1:]])

@@ -55,7 +55,7 @@ def _tetra_points(a: float) -> list[tuple[float, ...]]:
 FOUR: Rule = (np.array(_tetra_points((5 - np.sqrt(5)) / 20)), np.full(4, 1 / 24))  # exact for squares
 
 
-def _tetra_rule_of_14() -> Rule:
+def tetra_rule_of_14() -> Rule:
     """Exact for polynomials of degree 5: the two sets of four points and the six of edges whose moments are right (Walkington 2000)."""
     a, b, c = 0.31088591926330060980, 0.092735250310891226402, 0.045503704125649649492
     six = [tuple((0.5 - c if k in pair else c) for k in range(1, 4)) for pair in ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))]
@@ -122,6 +122,11 @@ class Solid:
         linear = {8: BRICK8, 6: WEDGE6, 5: PYRAMID5, 4: TETRA4}[len(self.corners)]
         return monomials(xi, linear) @ np.linalg.inv(monomials(self.corners, linear))
 
+    def mode_values(self, xi: np.ndarray) -> np.ndarray:
+        """Of the incompatible modes: (point, mode)."""
+        x, y, z = xi.T
+        return np.stack({3: [1 - x * x, 1 - y * y, 1 - z * z], 4: [x * x - x, y * y - y, x * y, 1 - z * z]}[self.modes], axis=-1)
+
     def mode_gradients(self, xi: np.ndarray) -> np.ndarray:
         """Of the incompatible modes, less their values at the centre: (point, k, mode)."""
         x, y, z = (xi - self.centre).T
@@ -140,7 +145,7 @@ MEAN = np.array([0, 0, -0.75])  # of a pyramid
 # By XDMF's code.
 KINDS = {
     6: Solid(SIMPLEX, TETRA_EDGES, TETRA4, 1, FOUR, QUARTER[None], QUARTER),
-    38: Solid(SIMPLEX, TETRA_EDGES, TETRA10, 2, _tetra_rule_of_14(), FOUR[0], QUARTER),
+    38: Solid(SIMPLEX, TETRA_EDGES, TETRA10, 2, tetra_rule_of_14(), FOUR[0], QUARTER),
     9: Solid(CUBE, HEX_EDGES, BRICK8, 1, brick_rule(2), ZERO[None], ZERO, 3),
     48: Solid(CUBE, HEX_EDGES, BRICK20, 2, brick_rule(3), brick_rule(2)[0], ZERO),
     50: Solid(CUBE, HEX_EDGES, BRICK27, 2, brick_rule(3), brick_rule(2)[0], ZERO, 0,
@@ -216,6 +221,14 @@ class Elements:
         w = weights * self._jacobians(points)[2]
         K = np.einsum("eqia,eij,eqjb,eq->eab", G, self.D, G, w, optimize=True)
         return -np.linalg.solve(K, np.einsum("eqia,eij,eqjb,eq->eab", G, self.D, B, w, optimize=True))
+
+    def displacements(self, xi: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """(element, point, 3, field) of nodal displacements (element, node, 3, field)."""
+        moved = np.einsum("qn,enkf->eqkf", self.kind.values(xi), u)
+        if not self.kind.modes:
+            return moved
+        inner = (self.amplitudes @ u.reshape(len(u), -1, u.shape[-1])).reshape(len(u), -1, 3, u.shape[-1])
+        return moved + np.einsum("qm,emkf->eqkf", self.kind.mode_values(xi), inner)
 
     def strains(self, xi: np.ndarray, u: np.ndarray) -> np.ndarray:
         """(element, point, 6, field) of nodal displacements (element, node, 3, field)."""
