@@ -72,7 +72,7 @@ function scaleOf(axis) {
     Object.assign(found.ticks, { callback: value => words.get(value) ?? "", autoSkip: false });
   } else if (axis.log) {
     // powers of ten alone; of few of them, their doubles and halves too
-    const first = value => Math.round(value / 10 ** Math.floor(Math.log10(value) + 1e-9));
+    const first = value => Number((value / 10 ** Math.floor(Math.log10(value) + 1e-9)).toPrecision(6));
     found.ticks.callback = function (value) { return first(value) === 1 || (this.max < 30 * this.min && [2, 5].includes(first(value))) ? short(value) : ""; };
   } else found.ticks.callback = short;
   return found;

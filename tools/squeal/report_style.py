@@ -79,6 +79,8 @@ summary { cursor: pointer; color: var(--blue); }
   th, td { padding-right: 0.6rem; }
   td { white-space: normal; }
   td.words { min-width: 9rem; }
+  .answers td:first-child { overflow-wrap: anywhere; min-width: 6.5rem; }
+  .plot { min-height: 300px; }
   .pictures, .charts { grid-template-columns: minmax(0, 1fr); }
   figure.broad { grid-column: auto; }
   #view { grid-template-columns: minmax(0, 1fr); }
