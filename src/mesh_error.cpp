@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 namespace squeal
 {
@@ -70,18 +69,14 @@ public:
   /// Pressures of the scene's mesh at pairs of the finer one [Pa]; NaN where one that they come from is open.
   std::vector<double> pressures(const Equilibrium& equilibrium) const
   {
-    std::map<std::size_t, double> closed; // by nodes
+    std::vector<double> at_nodes(coarse_.mesh.nodes.size(), std::nan(""));
     const std::vector<double> own = pressures_of(coarse_.interface, equilibrium);
     for (std::size_t i = 0; i < own.size(); ++i)
-      if (equilibrium.closed[i]) closed[static_cast<std::size_t>(coarse_.interface.geometry[i].node)] = own[i];
+      if (equilibrium.closed[i]) at_nodes[static_cast<std::size_t>(coarse_.interface.geometry[i].node)] = own[i];
     std::vector<double> result;
     for (const ContactPair& pair : fine_.interface.geometry)
-      result.push_back(sum_over_parents(static_cast<std::size_t>(pair.node),
-                                        [&](std::size_t node)
-                                        {
-                                          const auto found = closed.find(node);
-                                          return found == closed.end() ? std::nan("") : found->second;
-                                        }));
+      result.push_back(
+          sum_over_parents(static_cast<std::size_t>(pair.node), [&](std::size_t node) { return at_nodes[node]; }));
     return result;
   }
 

@@ -42,6 +42,7 @@ def of_modes(runs, figure):
     return sentences(("Every mode of the sliding brake below the band.", True),
                      ("The scale of growth is logarithmic away from 0.", figure.axes[0].get_yscale() == "symlog"),
                      ("Triangles above zero grow and may squeal.", any(len(line.get_xdata()) for line in figure.axes[0].lines if line.get_marker() == "^")),
+                     ("Bars are where the mesh leads the modes that it was asked about.", "limit of the mesh, with its bar" in drawn),
                      ("Squares are the projection on real modes.", "projection" in drawn))
 
 
