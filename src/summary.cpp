@@ -132,12 +132,14 @@ std::vector<PartMass> masses_of(const Mesh& mesh, const Scene& scene)
 {
   std::vector<PartMass> parts;
   for (const Part& part : scene.parts) parts.push_back({part.name});
-  for (const Element& element : mesh.elements)
+  for (std::size_t i = 0; i < mesh.elements.size(); ++i)
   {
+    const Element& element = mesh.elements[i];
     const auto place = static_cast<std::size_t>(element.part);
-    const double thickness = is_shell(element.shape) ? scene.parts[place].thickness : 1;
-    parts[place].mass += scene.parts[place].material.density * thickness *
-                         measure_of(element, position_matrix(positions_of(mesh, nodes_of(element))));
+    const Part& part = scene.parts[place];
+    const NodePositions x = position_matrix(positions_of(mesh, nodes_of(element)));
+    parts[place].mass += part.material.density * (is_shell(element.shape) ? part.thickness : 1) *
+                         measure_of(element, x + position_matrix(arms_of(mesh, i, part.offset)));
   }
   return parts;
 }

@@ -19,8 +19,8 @@ namespace
 {
 
 constexpr const char* known_elements =
-    "solids are bricks, wedges, pyramids and tetrahedra, with or without mid-side nodes; "
-    "shells are 4- and 3-node: set Mesh.ElementOrder = 2 or 1";
+    "they are bricks, wedges, pyramids, tetrahedra, quadrilaterals and triangles, with or without mid-side nodes: set "
+    "Mesh.ElementOrder = 2 or 1";
 
 /// Whether the Jacobian at the middle of a solid is negative.
 bool is_inside_out(const Element& element, const Mesh& mesh)
@@ -50,7 +50,7 @@ int part_of(const ElementBlock& block, const Scene& scene)
 void add_elements(const ElementBlock& block, int part, const Scene& scene, Mesh& mesh)
 {
   const std::optional<Shape> shape = shape_of(block.type);
-  if (!shape || dimension_of(*shape) == 1 || (is_shell(*shape) && !middles_of(*shape).empty()))
+  if (!shape || dimension_of(*shape) == 1)
     throw Error("part '" + scene.parts[part].name + "' has elements '" + block.type_name +
                 "', for which there is no kernel: " + known_elements);
   const int n = block.nodes_per_element;
@@ -235,10 +235,10 @@ void check_doubles(const Mesh& mesh, const Scene& scene)
 /// Corners of a side or a quadrilateral, ascending after -1, and the node in its middle or -1.
 using MiddleOfSide = std::pair<std::array<int, 4>, int>;
 
-/// Those of a solid. Mid-sides on edges of shells follow them (squeal/mesh/contact_pairs.hpp).
 std::vector<MiddleOfSide> sides_of(const Element& element)
 {
   std::vector<MiddleOfSide> sides;
+  const std::span<const int> nodes = nodes_of(element);
   const auto add = [&](std::span<const int> corners, int middle)
   {
     auto& [key, node] = sides.emplace_back(std::array{-1, -1, -1, -1}, middle);
@@ -252,7 +252,9 @@ std::vector<MiddleOfSide> sides_of(const Element& element)
   }
   const std::size_t middles = sides.size();
   const bool is_full = std::ranges::any_of(middles_of(element.shape), [](const auto& of) { return of.size() == 4; });
-  for (const std::vector<int>& face : faces_of(element))
+  std::vector<std::vector<int>> faces = faces_of(element);
+  if (is_shell(element.shape)) faces.emplace_back(nodes.begin(), nodes.begin() + corner_count(element.shape));
+  for (const std::vector<int>& face : faces)
   {
     for (std::size_t i = 0; middles == 0 && i < face.size(); ++i)
       add(std::array{face[i], face[(i + 1) % face.size()]}, -1);
@@ -261,7 +263,8 @@ std::vector<MiddleOfSide> sides_of(const Element& element)
   return sides;
 }
 
-/// Throws Error for a mid-side or mid-face node that another solid does not have there.
+/// Throws Error for a mid-side or mid-face node that another element does not have there. A shell need not have those
+/// of a solid: they follow its edge (squeal/mesh/contact_pairs.hpp).
 void check_middles(const Mesh& mesh, const Scene& scene)
 {
   const auto has_middles = [](const Element& element) { return !middles_of(element.shape).empty(); };
@@ -271,14 +274,45 @@ void check_middles(const Mesh& mesh, const Scene& scene)
     for (const auto& [side, middle] : sides_of(element))
     {
       const auto [before, is_new] = known.emplace(side, std::pair(middle, &element));
-      const auto& [other_middle, other] = before->second;
+      const auto [other_middle, other] = before->second;
       if (other_middle == middle) continue;
       const bool has_it = middle > other_middle; // the other one has none, or a lower one
+      if (has_it) before->second = {middle, &element};
+      if (is_shell((has_it ? *other : element).shape) && !is_shell((has_it ? element : *other).shape)) continue;
       const int hanging = std::max(middle, other_middle);
       throw Error(named_part(has_it ? element : *other, scene) + " has the mid-side " +
                   node_text(hanging, mesh.nodes[hanging]) + " on " + (side[1] < 0 ? "an edge" : "a face") + " that " +
                   named_part(has_it ? *other : element, scene) +
                   " has without it: the bodies would part there. Mesh both by elements of one order");
+    }
+}
+
+/// Sets the normals of shells. At a node it is the mean of its own and of its part's others that look its way.
+void set_normals(Mesh& mesh)
+{
+  constexpr double same_way = 0.8; // least cosine; beyond is a fold, or a neighbour that is numbered the other way
+  std::map<std::pair<int, int>, std::vector<Vec3>> at; // by part and node; as long as the areas there
+  for (std::size_t i = 0; i < mesh.elements.size(); ++i)
+  {
+    const Element& element = mesh.elements[i];
+    if (!is_shell(element.shape)) continue;
+    const NodePositions x = position_matrix(positions_of(mesh, nodes_of(element)));
+    std::vector<Vec3>& own = mesh.normals[static_cast<int>(i)];
+    for (const Eigen::Vector3d& place : natural_positions(element.shape))
+    {
+      const Eigen::Matrix3d J = shape_functions(element.shape, place).dN * x.transpose();
+      const Eigen::Vector3d normal = J.row(0).cross(J.row(1));
+      at[{element.part, element.nodes[own.size()]}].push_back({normal(0), normal(1), normal(2)});
+      own.push_back(at[{element.part, element.nodes[own.size()]}].back());
+    }
+  }
+  for (auto& [i, normals] : mesh.normals)
+    for (std::size_t k = 0; k < normals.size(); ++k)
+    {
+      Vec3 sum{};
+      for (const Vec3& other : at[{mesh.elements[i].part, mesh.elements[i].nodes[k]}])
+        if (dot(normals[k], other) >= same_way * norm(normals[k]) * norm(other)) sum = sum + other;
+      normals[k] = (1 / norm(sum)) * sum;
     }
 }
 
@@ -325,6 +359,7 @@ Mesh build_mesh(const FileMesh& file, const Scene& scene)
   const std::vector<int> number = drop_unused_nodes(mesh);
   check_doubles(mesh, scene);
   check_middles(mesh, scene);
+  set_normals(mesh);
   std::map<std::string, std::set<int>> groups, dimensions;
   for (const ElementBlock& block : file.blocks)
     for (const std::string& name : block.groups)

@@ -312,20 +312,14 @@ std::string name_of(const Scene& scene, int tie)
 /// kept to rounding.
 TiedNode solved(const Mesh& mesh, const SlaveRow& row, int node, int tie)
 {
-  TiedNode result{node, tie, {}};
-  double own = 0, sum = 0;
+  double own = 0;
+  std::vector<PairNode> others = row.master;
   for (const auto& [other, weight] : row.slave)
     if (other == node)
       own = weight;
     else
-      result.others.push_back({other, -weight});
-  for (const auto& [other, weight] : row.master)
-    if (std::abs(weight) > 1e-13 * row.area) result.others.push_back({other, weight});
-  for (PairNode& other : result.others) sum += other.weight /= own;
-  const auto largest =
-      std::max_element(result.others.begin(), result.others.end(),
-                       [](const auto& a, const auto& b) { return std::abs(a.weight) < std::abs(b.weight); });
-  largest->weight += 1 - sum;
+      others.push_back({other, -weight});
+  TiedNode result{node, tie, normalised(others, own)};
   result.arm = mesh.nodes[node];
   for (const auto& [other, weight] : result.others) result.arm = result.arm - weight * mesh.nodes[other];
   return result;
@@ -356,7 +350,7 @@ void add_mid_sides(const Mesh& mesh, TiedNodes& result)
   const auto ends_of = [](int a, int b) { return Ends(std::min(a, b), std::max(a, b)); };
   std::set<Ends> edges; // of shells
   for (const Element& element : mesh.elements)
-    for (int i = 0, n = corner_count(element.shape); i < n && is_shell(element.shape); ++i)
+    for (int i = 0, n = node_count(element.shape); n < 5 && i < n && is_shell(element.shape); ++i)
       edges.insert(ends_of(element.nodes[i], element.nodes[(i + 1) % n]));
   if (edges.empty()) return;
   std::set<int> found;

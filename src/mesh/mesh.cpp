@@ -237,6 +237,7 @@ void broadcast_mesh(Mesh& mesh, MPI_Comm comm)
   broadcast_packed(mesh.surfaces, comm);
   broadcast_packed(mesh.node_groups, comm);
   broadcast_packed(mesh.dimensions, comm);
+  broadcast_packed(mesh.normals, comm);
   broadcast_packed(mesh.points, comm);
   broadcast_packed(mesh.beams, comm);
   broadcast_packed(mesh.superelements, comm);

@@ -192,6 +192,15 @@ std::vector<Vec3> positions_of(const Mesh& mesh, std::span<const int> nodes)
   return x;
 }
 
+std::vector<Vec3> arms_of(const Mesh& mesh, std::size_t element, double offset)
+{
+  std::vector<Vec3> arms(nodes_of(mesh.elements[element]).size(), Vec3{});
+  if (offset != 0)
+    std::ranges::transform(mesh.normals.at(static_cast<int>(element)), arms.begin(),
+                           [&](const Vec3& normal) { return offset * normal; });
+  return arms;
+}
+
 std::span<const std::array<int, 4>> corner_faces(Shape shape)
 {
   return topology(shape).faces;

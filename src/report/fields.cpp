@@ -28,6 +28,9 @@ struct XdmfShape
 const std::array xdmf_shapes = {
     XdmfShape{Shape::triangle3, 4},
     XdmfShape{Shape::quad4, 5},
+    XdmfShape{Shape::triangle6, 36},
+    XdmfShape{Shape::quad8, 37},
+    XdmfShape{Shape::quad9, 35},
     XdmfShape{Shape::tet4, 6},
     XdmfShape{Shape::pyramid5, 7},
     XdmfShape{Shape::wedge6, 8},

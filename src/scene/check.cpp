@@ -108,6 +108,8 @@ private:
     if (part.rotation && material.orthotropy)
       fail(&*part.rotation, label + "rotation needs a material that is alike in all directions: the axes of an "
                                     "orthotropic one would turn; give young and poisson");
+    if (part.offset != 0 && part.thickness == 0)
+      fail(&part.offset, label + "offset is for shells: give the part a thickness, or take the offset out");
     if (!material.orthotropy)
     {
       if (!(material.young > 0)) fail(&material.young, label + "needs the key 'young' [Pa] above 0, or 'orthotropic'");

@@ -127,6 +127,8 @@ SceneKeys keys_of(Part& p)
        stiffness_and_mass},
       {"density", &p.material.density, "kg/m3", "mass density", required, positive, mass, derive_and_double},
       {"thickness", &p.thickness, "m", "thickness of a shell; 0 is a solid", not_negative, stiffness_and_mass},
+      {"offset", &p.offset, "m", "distance of a shell's middle surface from its nodes, along its normal",
+       stiffness_and_mass},
       {"loss_factor", &p.loss_factor, "-",
        "eta of the stiffness K (1 + i eta), at most 10, with damping.loss_frequency; it adds to Rayleigh damping",
        not_negative, damping, derive},

@@ -155,7 +155,9 @@ Contribution element_contribution(const NumberedMesh& numbered, const Scene& sce
   const std::vector<Vec3> x = positions_of(numbered.mesh, nodes_of(element));
   try
   {
-    return damped(nodal_dofs_of(element), element_matrices(element.shape, x, material_at(part, x), part.thickness),
+    return damped(nodal_dofs_of(element),
+                  element_matrices(element.shape, x, material_at(part, x), part.thickness,
+                                   arms_of(numbered.mesh, index, part.offset)),
                   part.damping.value_or(scene.damping), part.loss_factor, loss_omega(scene));
   }
   catch (const std::runtime_error& error)

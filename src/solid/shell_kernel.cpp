@@ -2,11 +2,12 @@
 ///     D = diag(h C, G h, h^3/12 C, kappa G h I),
 /// with C of plane stress, h the thickness, G the shear modulus and kappa = 5/6 the shear correction.
 ///
-/// Axes: z is normal to both diagonals (to two sides of a triangle). The nodes of a warped quadrilateral are at +-d
-/// from its plane and connected to it by rigid links: u_plane = u + r x (-d z). Rigid motions stay exact. Mass: rho h
-/// of the displacements, with sides curved by the rotations of their ends, and rho h^3/12 N_i N_j on all three
-/// rotations. The drilling rotation is included, so that M is positive definite and the same in all axes. Caveat: flat
-/// elements do not couple membrane and bending, so that curved shells converge with the mesh only.
+/// Axes: z is normal to both diagonals (to two sides of a triangle). The middle surface is at arms a from the nodes,
+/// and a warped quadrilateral's is at +-d from its plane. Rigid links connect them: u_plane = u + r x (a - d z). Rigid
+/// motions stay exact. Mass: rho h of the displacements, with sides curved by the rotations of their ends, and rho
+/// h^3/12 N_i N_j on all three rotations. The drilling rotation is included, so that M is positive definite and the
+/// same in all axes. Caveat: flat elements do not couple membrane and bending, so that curved shells converge with the
+/// mesh only.
 ///
 /// The membrane has a rotation about the normal at each node (drilling rotation).
 ///
@@ -32,6 +33,9 @@
 /// w,s + beta_s = gamma_k on the side:
 ///     a_k = -3 / (2 L (1 + phi_k)) (w_j - w_i + L/2 t . (beta_i + beta_j)).
 /// The shear strain is the field with the constant tangential value gamma_k on each side (edge functions).
+///
+/// Shells with mid-side nodes consist of these two, so that they are as sound when thin. Caveat: their error falls with
+/// the square of the length, as that of their facets does.
 #include "kernels.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 
@@ -184,14 +188,16 @@ void add_plate(ShellStrains<n>& B, const PlanePositions<n>& X, const Eigen::Vect
 /// The plane of an element with n nodes.
 template <int n> struct Facet
 {
-  Eigen::Matrix3d axes;            // [-] rows: unit vectors x, y, z
-  PlanePositions<n> plane;         // [m] nodes in x and y about their centre
-  Eigen::Vector<double, n> offset; // [m] nodes along z from the plane
+  Eigen::Matrix3d axes;             // [-] rows: unit vectors x, y, z
+  PlanePositions<n> plane;          // [m] nodes in x and y about their centre
+  Eigen::Matrix<double, 3, n> arms; // [m] from the nodes to their places in the plane, in global axes
 };
 
-/// Returns the plane of an element; its x is the projection of the first side on the plane.
-template <int n> Facet<n> make_facet(const NodePositions& X)
+/// Returns the plane of an element whose middle surface is at these arms from its nodes; its x is the projection of the
+/// first side on the plane.
+template <int n> Facet<n> make_facet(const NodePositions& nodes, const NodePositions& arms)
 {
+  const NodePositions X = nodes + arms;
   const Eigen::Vector3d side = X.col(1) - X.col(0);
   const Eigen::Vector3d a = n == 3 ? side : X.col(2) - X.col(0);
   const Eigen::Vector3d b = n == 3 ? X.col(2) - X.col(0) : X.col(3) - X.col(1);
@@ -201,7 +207,7 @@ template <int n> Facet<n> make_facet(const NodePositions& X)
   facet.axes << x.normalized().transpose(), z.cross(x).normalized().transpose(), z.transpose();
   const Eigen::Matrix<double, 3, n> local = facet.axes * (X.colwise() - X.rowwise().mean().eval());
   facet.plane = local.template topRows<2>();
-  facet.offset = local.row(2).transpose();
+  facet.arms = arms - z * local.row(2);
   return facet;
 }
 
@@ -213,8 +219,7 @@ template <int n> Square<n> local_transformation(const Facet<n>& facet)
   {
     T.template block<3, 3>(6 * i, 6 * i) = facet.axes;
     T.template block<3, 3>(6 * i + 3, 6 * i + 3) = facet.axes;
-    T.template block<1, 3>(6 * i, 6 * i + 3) = -facet.offset(i) * facet.axes.row(1);
-    T.template block<1, 3>(6 * i + 1, 6 * i + 3) = facet.offset(i) * facet.axes.row(0);
+    T.template block<3, 3>(6 * i, 6 * i + 3) = facet.axes.rowwise().cross(-facet.arms.col(i).transpose());
   }
   return T;
 }
@@ -304,9 +309,20 @@ template <int n> Square<n> plane_mass(const PlanePositions<n>& X, double density
   return M;
 }
 
-template <int n> ElementMatrices matrices(const NodePositions& X, const Material& material, double h)
+/// Nodes of the flat shells that a shape consists of.
+std::vector<std::vector<int>> facets_of(Shape shape)
 {
-  const Facet<n> facet = make_facet<n>(X);
+  if (shape == Shape::triangle3) return {{0, 1, 2}};
+  if (shape == Shape::quad4) return {{0, 1, 2, 3}};
+  if (shape == Shape::triangle6) return {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}};
+  if (shape == Shape::quad8) return {{0, 4, 7}, {4, 1, 5}, {5, 2, 6}, {6, 3, 7}, {4, 5, 6}, {4, 6, 7}};
+  return {{0, 4, 8, 7}, {4, 1, 5, 8}, {8, 5, 2, 6}, {7, 8, 6, 3}}; // quad9
+}
+
+template <int n>
+ElementMatrices matrices(const NodePositions& X, const NodePositions& arms, const Material& material, double h)
+{
+  const Facet<n> facet = make_facet<n>(X, arms);
   const Square<n> T = local_transformation(facet);
   const auto in_global_axes = [&](const Square<n>& A) -> Eigen::MatrixXd
   {
@@ -320,9 +336,22 @@ template <int n> ElementMatrices matrices(const NodePositions& X, const Material
 
 } // namespace
 
-ElementMatrices shell_matrices(Shape shape, const NodePositions& X, const Material& material, double thickness)
+ElementMatrices shell_matrices(Shape shape, const NodePositions& X, const NodePositions& arms, const Material& material,
+                               double thickness)
 {
-  return shape == Shape::triangle3 ? matrices<3>(X, material, thickness) : matrices<4>(X, material, thickness);
+  const Eigen::Index dofs = 6 * X.cols();
+  ElementMatrices sum{Eigen::MatrixXd::Zero(dofs, dofs), Eigen::MatrixXd::Zero(dofs, dofs)};
+  for (const std::vector<int>& nodes : facets_of(shape))
+  {
+    const auto of = nodes.size() == 3 ? matrices<3> : matrices<4>;
+    const auto [K, M] = of(X(Eigen::all, nodes), arms(Eigen::all, nodes), material, thickness);
+    std::vector<int> rows;
+    for (const int node : nodes)
+      for (int c = 0; c < 6; ++c) rows.push_back(6 * node + c);
+    sum.stiffness(rows, rows) += K;
+    sum.mass(rows, rows) += M;
+  }
+  return sum;
 }
 
 } // namespace squeal

@@ -257,10 +257,11 @@ int dofs_per_node(Shape shape)
   return is_shell(shape) ? 6 : 3;
 }
 
-ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Material& material, double thickness)
+ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Material& material, double thickness,
+                                 std::span<const Vec3> arms)
 {
-  const NodePositions X = position_matrix(x);
-  return is_shell(shape) ? shell_matrices(shape, X, material, thickness) : solid_matrices(shape, X, material);
+  const NodePositions X = position_matrix(x), A = arms.empty() ? NodePositions(0 * X) : position_matrix(arms);
+  return is_shell(shape) ? shell_matrices(shape, X, A, material, thickness) : solid_matrices(shape, X, material);
 }
 
 } // namespace squeal

@@ -376,10 +376,10 @@ def test_what_bulk_data_has_and_the_mesh_has_not_is_named(tmp_path):
     scene = convert(tmp_path / "a.bdf", tmp_path / "out").read_text()
     assert scene.count("\nloss_factor = 0.03\n") == 2
     notes = "\n".join(model.notes)
-    for words in ("the cards CGAP (2)", "ZOFFS of 1 CQUAD4", "T1 to T4 of 1 CQUAD4", "PARAM W5",
+    for words in ("the cards CGAP (2)", "T1 to T4 of 1 CQUAD4", "PARAM W5",
                   "thickness 5 of PSHELL 30, whose elements lie on solids", "MID2, 12I/T**3, NSM of PSHELL 20"):
         assert words in notes, words
-    assert len(model.notes) == 6 and 'fixed = "z"\ndisplacement = [0, 0, 0.5]' in scene
+    assert len(model.notes) == 5 and "\noffset = 0.1\n" in scene and 'fixed = "z"\ndisplacement = [0, 0, 0.5]' in scene
 
 
 def test_parts_of_one_name_are_two(tmp_path):
@@ -496,7 +496,7 @@ def test_what_an_input_deck_has_and_the_mesh_has_not_is_named(tmp_path):
         "*BOUNDARY, OP=NEW\nskins, 4, 6\nn, ENCASTRE\nn, 11, 11, 20.\n*NSET, NSET=Skins\n5,6,7\n"
         "*STEP\n*STATIC\n*TEMPERATURE\n1,1.\n*TEMPERATURE\n2,1.\n*DSLOAD\nside, TRVEC, 1.\n*NODE FILE\nU\n*END STEP\n"))
     notes = "\n".join(model.notes)
-    for words in ("2 elements of type B31", "OFFSET=SPOS of *SHELL SECTION (line 40)",
+    for words in ("2 elements of type B31",
                   "*SECTION PRINT (line 53)", "OP=NEW of *BOUNDARY (line 55)",
                   "*TEMPERATURE (2 times, first in line 63)", "*DSLOAD of type TRVEC on side (line 68)", "first line of *ELASTIC (line 35)",
                   "2 layers of *SHELL SECTION", "tie of row (slave) and Top (master): row has no faces",
@@ -505,9 +505,10 @@ def test_what_an_input_deck_has_and_the_mesh_has_not_is_named(tmp_path):
                   "1 shell without a *SHELL SECTION",
                   "1 node of the set n", "1 element of the set mixed that are not there, 77 the first", "the set rod, whose elements"):
         assert words in notes, words
-    assert len(model.notes) == 16 and model.contacts[0][0].startswith("FILL IN [a surface]: r of the deck has no faces")
+    assert len(model.notes) == 15 and model.contacts[0][0].startswith("FILL IN [a surface]: r of the deck has no faces")
     assert model.ties == [("side", "Top")] and model.contacts[1] == ("side", "Top", {"friction": 0}) and held(model) == {"n": list(MOTIONS)}
     assert model.parts["skin"].thickness == pytest.approx(0.3, rel=1e-15) and model.parts["skin"].material == "M"
+    assert model.parts["skin"].offset == pytest.approx(-0.15, rel=1e-15)
     scene = convert(tmp_path / "deck.inp", tmp_path / "out").read_text()
     assert "loss_factor = 0.01\nbeta = 1e-07\n" in scene and "loss_frequency = 10000" in scene
 

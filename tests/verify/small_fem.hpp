@@ -144,11 +144,15 @@ inline Mesh pyramids(Mesh mesh)
                {{0, 1, 2, 3, 8}, {0, 4, 5, 1, 8}, {0, 3, 7, 4, 8}, {5, 6, 2, 1, 8}, {2, 6, 7, 3, 8}, {4, 7, 6, 5, 8}});
 }
 
-/// A brick mesh as the same domain in another solid shape; mid-sides in gmsh's order.
+/// A mesh of bricks or quadrilaterals as the same domain in another shape; mid-sides in gmsh's order.
 inline Mesh in_shape(const Mesh& bricks, Shape shape)
 {
   switch (shape)
   {
+  case Shape::triangle3:
+    return recut(bricks, shape, {{0, 1, 2}, {0, 2, 3}});
+  case Shape::triangle6:
+    return with_middles(in_shape(bricks, Shape::triangle3), shape);
   case Shape::wedge6:
     return recut(bricks, shape, {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 4, 6, 7}});
   case Shape::wedge15:
@@ -159,6 +163,8 @@ inline Mesh in_shape(const Mesh& bricks, Shape shape)
   case Shape::pyramid13:
   case Shape::pyramid14:
     return with_middles(pyramids(bricks), shape);
+  case Shape::quad8:
+  case Shape::quad9:
   case Shape::hex20:
   case Shape::hex27:
     return with_middles(bricks, shape);
@@ -171,9 +177,14 @@ inline Mesh in_shape(const Mesh& bricks, Shape shape)
   }
 }
 
-inline Mesh triangles(const Mesh& quads)
+/// A lattice of shells; those of more than four nodes have half as many cells, so that a side has as many nodes. All
+/// nodes are where `place` maps the unit square.
+inline Mesh shells(Shape shape, int nx, int ny, const std::function<Vec3(double, double)>& place)
 {
-  return recut(quads, Shape::triangle3, {{0, 1, 2}, {0, 2, 3}});
+  const int half = squeal::node_count(shape) > 4 ? 2 : 1;
+  Mesh mesh = in_shape(quads(nx / half, ny / half, [](double x, double y) { return Vec3{x, y, 0}; }), shape);
+  for (Vec3& x : mesh.x) x = place(x[0], x[1]);
+  return mesh;
 }
 
 using Sparse = Eigen::SparseMatrix<double>;

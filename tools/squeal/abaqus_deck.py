@@ -16,7 +16,7 @@ from squeal.deck_files import Problem, blocks_of, number, span, undefined, whole
 from squeal.mesh_model import FLAT, KINDS, MOTIONS, Model
 
 SOLIDS = {"4": "tet4", "5": "pyramid5", "6": "wedge6", "8": "hex8", "10": "tet10", "15": "wedge15", "20": "hex20", "27": "hex27"}
-SHELLS = {"3": "tri3", "4": "quad4"}
+SHELLS = {"3": "tri3", "4": "quad4", "6": "tri6", "8": "quad8", "9": "quad9"}
 SKINS = {"3": "tri3", "4": "quad4", "6": "tri6", "8": "quad8"}
 NAMED_SUPPORTS = {"ENCASTRE": "x y z rx ry rz", "PINNED": "x y z", "XSYMM": "x ry rz", "YSYMM": "y rx rz", "ZSYMM": "z rx ry",
                   "XASYMM": "y z rx", "YASYMM": "x z ry", "ZASYMM": "x y rz"}
@@ -24,7 +24,7 @@ NAMED_SUPPORTS = {"ENCASTRE": "x y z rx ry rz", "PINNED": "x y z", "XSYMM": "x r
 OPTIONS = {"NODE": "NSET,SYSTEM,INPUT", "ELEMENT": "TYPE,ELSET,INPUT", "SURFACE": "NAME,TYPE,INTERNAL,INPUT,COMBINE",
            "BOUNDARY": "INPUT,FIXED", "ELASTIC": "TYPE", "DENSITY": "", "DAMPING": "ALPHA,BETA,STRUCTURAL",
            "SOLID SECTION": "ELSET,MATERIAL,ORIENTATION,CONTROLS", "TRANSFORM": "NSET,TYPE",
-           "SHELL SECTION": "ELSET,MATERIAL,CONTROLS,COMPOSITE", **abaqus_joining.OPTIONS, **abaqus_steps.OPTIONS}
+           "SHELL SECTION": "ELSET,MATERIAL,CONTROLS,COMPOSITE,OFFSET", **abaqus_joining.OPTIONS, **abaqus_steps.OPTIONS}
 # in the order of the deck, once mesh, sets and sections are there
 HANDLERS = {**abaqus_joining.HANDLERS, **abaqus_steps.HANDLERS}
 READ = {*OPTIONS, *HANDLERS, "ELSET", "NSET", "MATERIAL", "ORIENTATION"}
@@ -44,7 +44,7 @@ def kind_of(name, place):
         return SOLIDS[solid[1]]
     if shell := re.match(r"(?:S|STRI)(\d)", name):
         if shell[1] not in SHELLS:
-            raise Problem(f"{place}: elements {name}: expected shells with 3 or 4 nodes")
+            raise Problem(f"{place}: elements {name}: expected shells with 3, 4, 6, 8 or 9 nodes")
         return SHELLS[shell[1]]
     if skin := re.match(r"(?:SFM3D|CPS|CPE)(\d)", name):
         return SKINS.get(skin[1])
@@ -181,7 +181,7 @@ def note_what_is_left_out(deck):
             near = [] if block.name in OTHERS else difflib.get_close_matches(block.name, READ, 1, 0.85)
             found.setdefault(f"*{block.name}" + (f", is it *{near[0]}?" if near else ""), []).append(block.place)
         for key, value in block.options.items() if block.name in OPTIONS else ():
-            if key not in OPTIONS[block.name].split(",") and f"{key}={value}".upper() not in ("OFFSET=SMID", "OP=MOD", "TYPE=DISPLACEMENT"):
+            if key not in OPTIONS[block.name].split(",") and f"{key}={value}".upper() not in ("OP=MOD", "TYPE=DISPLACEMENT"):
                 found.setdefault(f"{key}{'=' if value else ''}{value} of *{block.name}", []).append(block.place)
     for what, places in found.items():
         times = f"{len(places)} times, first in " if len(places) > 1 else ""

@@ -119,6 +119,7 @@ def read_sections(deck):
         part.axes = axes.get(turned.upper())
         if block.name == "SHELL SECTION":
             read_thickness(block, part, deck)
+            part.offset = -part.thickness * offset_of(block, deck)
         shown = elements.sets.names[name.upper()]
         kinds = FLAT if block.name == "SHELL SECTION" else KINDS
         fit = [n for n in numbers if n in model.elements and model.elements[n][0] in kinds]
@@ -138,6 +139,17 @@ def read_sections(deck):
             if free and sets.names[key] not in model.parts:
                 model.parts[sets.names[key]] = Part(free)
                 owner.update(dict.fromkeys(free, sets.names[key]))
+
+
+def offset_of(block, deck):
+    """The nodes' distance from the middle surface, in thicknesses."""
+    word = block.options.get("OFFSET", "SMID").upper()
+    if word in ("SMID", "SPOS", "SNEG"):
+        return {"SMID": 0.0, "SPOS": 0.5, "SNEG": -0.5}[word]
+    if re.match(r"[-+.\d]", word):
+        return number(word, block.place)
+    deck.note(f"OFFSET={word} of *SHELL SECTION, which varies", block.place)
+    return 0.0
 
 
 def read_thickness(block, part, deck):

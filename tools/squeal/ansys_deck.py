@@ -12,11 +12,11 @@ from squeal import ansys_selection
 from squeal.ansys_joining import Side
 from squeal.common import counted
 from squeal.deck_files import Problem, lines_of, number, span, whole
-from squeal.mesh_model import FLAT, KINDS, Model, Part
+from squeal.mesh_model import FACE_OF_SIZE, FLAT, KINDS, Model, Part
 
 # squeal's kinds by element type and by the number of different nodes
 SOLIDS = {45: 8, 65: 8, 185: 8, 190: 8, 95: 20, 186: 20, 92: 10, 187: 10, 285: 4}
-SHELLS = {63: 4, 181: 4, 43: 4}
+SHELLS = {63: 4, 181: 4, 43: 4, 93: 8, 281: 8}
 TARGETS, CONTACTS = {169, 170}, {171, 172, 173, 174, 175, 177}
 SKINS = {152, 154}
 ELASTIC = {"EX": "young", "PRXY": "poisson", "NUXY": "poisson", "DENS": "density", "DMPR": "loss_factor", "BETD": "beta", "ALPD": "alpha"}
@@ -59,6 +59,7 @@ class Deck:
         self.bolts = {}  # (place, nodes) of PRETS179, by section
         self.section, self.is_pretension = 0, False  # that data are of
         self.section_names, self.directions, self.tension, self.thickness = {}, {}, {}, {}  # by section
+        self.middles = {}  # offsets of the middle surface from the nodes, in thicknesses, by section
         self.systems = Counter()  # elements by material and coordinate system
         self.state = ansys_selection.State()
         self.skin_types, self.pressed_nodes = {}, []  # types of surface elements; (nodes, value, place)
@@ -222,8 +223,10 @@ def add_element(deck, place, label, attributes, nodes):
         deck.bodies.setdefault((material, 0), []).append(label)
         deck.systems[material, system] += system != 0
     elif kind in SHELLS:
-        shape = "tri3" if nodes[2] == nodes[3] else "quad4"
-        model.add_element(place, label, shape, nodes[: 3 if shape == "tri3" else 4], "abaqus")
+        nodes = face_of(nodes[: SHELLS[kind]])
+        if len(nodes) not in FACE_OF_SIZE:
+            raise Problem(f"{place}: a shell of {len(nodes)} different nodes; expected 3, 4, 6 or 8")
+        model.add_element(place, label, FACE_OF_SIZE[len(nodes)], nodes, "abaqus")
         deck.bodies.setdefault((material, section or 1), []).append(label)
     elif kind in TARGETS | CONTACTS:
         side = Side.TARGET if kind in TARGETS else Side.CONTACT
@@ -355,6 +358,7 @@ def rotation(words, place, deck):
 COMMANDS = {"R": real_constants, "CMROTATE": rotation, "KEYOPT": key_option, "KEYOP": key_option, "KEYO": key_option,
             "ET": element_type, "MPDATA": material_data, "MP": material_data,
             "N": node, "CE": ansys_equations.read_equation, "SECTYPE": ansys_equations.section_type, "SECDATA": ansys_equations.section_data,
+            "SECOFFSET": ansys_equations.section_offset, "SECO": ansys_equations.section_offset,
             "SLOAD": ansys_equations.section_load, **ansys_loads.COMMANDS, **ansys_selection.COMMANDS}
 
 
@@ -370,7 +374,8 @@ def finish(deck):
     several = Counter(material for material, _ in deck.bodies)
     for (material, section), elements in deck.bodies.items():
         name = deck.state.body_names.get((material, section)) or f"material_{material}" + (f"_shells_{section}" if section and several[material] > 1 else "")
-        model.parts[model.unused(name)] = Part(elements, material, deck.thickness.get(section, 0.0) if section else 0.0)
+        thickness = deck.thickness.get(section, 0.0) if section else 0.0
+        model.parts[model.unused(name)] = Part(elements, material, thickness, thickness * deck.middles.get(section, 0.0))
     ansys_equations.bolts(deck)
     ansys_equations.rigid_regions(deck)
     rotors = ansys_joining.rotors_of(deck)

@@ -154,6 +154,15 @@ def section_data(words, place, deck):
         deck.thickness[deck.section] = deck.thickness.get(deck.section, 0.0) + values[0]
 
 
+def section_offset(words, place, deck):
+    """SECOFFSET,TOP, BOT or MID: where in a shell its nodes are."""
+    word = words[1].upper()[:3] if len(words) > 1 else ""
+    if word in ("TOP", "BOT", "MID"):
+        deck.middles[deck.section] = {"TOP": -0.5, "BOT": 0.5, "MID": 0.0}[word]
+    elif not deck.is_pretension:
+        deck.note(f"SECOFFSET,{','.join(words[1:])} of section {deck.section}", place)
+
+
 def section_block(words, lines, deck):
     """SECBLOCK: the layers of a shell, a line each, or the node and direction of a bolt."""
     for _ in range(whole(words[1] if len(words) > 1 else "", lines.place())):

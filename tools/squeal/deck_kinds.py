@@ -87,7 +87,7 @@ def split_orders(model):
         if 0 < len(linear) < len(part.elements):
             shown, taken = model.unused(f"{name}_linear"), set(linear)
             model.notes.append(f"that {counted(len(linear), 'element')} of {name} are linear beside quadratic ones: they are the part {shown}")
-            model.parts[shown] = Part(linear, part.material, part.thickness)
+            model.parts[shown] = Part(linear, part.material, part.thickness, part.offset)
             model.parts[shown].axes = part.axes
             part.elements = [n for n in part.elements if n not in taken]
 

@@ -9,7 +9,7 @@ from squeal.msh_mesh import KIND_OF, read_mesh
 from squeal.scene import with_numbers
 
 TYPES = {"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8", "hex20": "C3D20", "wedge6": "C3D6", "wedge15": "C3D15",
-         "pyramid5": "C3D5", "hex27": "C3D27", "tri3": "S3", "quad4": "S4"}
+         "pyramid5": "C3D5", "hex27": "C3D27", "tri3": "S3", "quad4": "S4", "tri6": "STRI65", "quad8": "S8R", "quad9": "S9R5"}
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 WRITTEN = set("title gravity numbers mesh part point rigid_body coupling spring connector beam mass support force pressure bolt rotor contact "
               "step tie friction damping modes".split())
@@ -171,7 +171,8 @@ class Writer:
                 else:
                     self.add(f"ORIENTATION, NAME=axes_{name}", numbers([*vector(law.get("axis_1", "x")), *vector(law.get("axis_2", "y"))]))
             if part.get("thickness", 0) > 0:
-                self.add(f"SHELL SECTION, ELSET={name}, MATERIAL=of_{name}", numbers([part["thickness"]]))
+                offset = f", OFFSET={-part['offset'] / part['thickness']!r}" if part.get("offset") else ""
+                self.add(f"SHELL SECTION, ELSET={name}, MATERIAL=of_{name}{offset}", numbers([part["thickness"]]))
             else:
                 self.add(f"SOLID SECTION, ELSET={name}, MATERIAL=of_{name}{orientation}")
             self.notes += [f"rotation of part {name}"] if "rotation" in part else []

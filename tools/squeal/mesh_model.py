@@ -60,8 +60,9 @@ def order_back(kind):
 
 
 class Part:
-    def __init__(self, elements, material=None, thickness=0.0):
+    def __init__(self, elements, material=None, thickness=0.0, offset=0.0):
         self.elements, self.material, self.thickness = elements, material, thickness
+        self.offset = offset  # of shells: from the nodes to the middle surface, along the normal
         self.axes = None  # of an orthotropic material: axis_1 and axis_2, or cylinder
 
 

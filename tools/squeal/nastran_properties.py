@@ -4,16 +4,31 @@ import numpy as np
 from squeal.deck_files import Problem
 from squeal.mesh_model import FLAT, KINDS, Part, corners_of
 
-SHELL_FIELDS = {"CQUAD4": {"ZOFFS": (9,), "T1 to T4": (12, 13, 14, 15)},
-                "CTRIA3": {"ZOFFS": (8,), "T1 to T3": (12, 13, 14)}}
+# places of ZOFFS and of the thicknesses at the corners
+SHELL_FIELDS = {"CQUAD4": (9, (12, 13, 14, 15)), "CTRIA3": (8, (12, 13, 14)), "CQUADR": (9, (12, 13, 14, 15)), "CTRIAR": (8, (12, 13, 14)),
+                "CQUAD8": (17, (12, 13, 14, 15)), "CTRIA6": (11, (12, 13, 14))}
+MIDDLE_BY_WORD = {"TOP": -0.5, "BOTTOM": 0.5, "BOT": 0.5}  # of the thickness, of OptiStruct
 
 
 def note_shell_fields(cards, model):
-    for name, fields in SHELL_FIELDS.items():
-        for what, places in fields.items():
-            count = sum(any(card.number(i, 0.0) for i in places) for card in cards.elements[name])
-            if count:
-                model.notes.append(f"{what} of {count} {name}")
+    for name, (_, places) in SHELL_FIELDS.items():
+        count = sum(any(card.number(i, 0.0) for i in places) for card in cards.elements[name])
+        if count:
+            model.notes.append(f"T1 to T{len(places)} of {count} {name}")
+
+
+def offsets_of(cards, card, thickness, elements):
+    """Elements of a property by the offset of their middle surface from the nodes: their own ZOFFS, or else that of the PSHELL."""
+    def value(card, i):
+        word = card.field(i).upper()
+        return MIDDLE_BY_WORD[word] * thickness if word in MIDDLE_BY_WORD else card.number(i, 0.0)
+
+    usual = value(card, 14) if card and card.name == "PSHELL" else 0.0
+    own = {of.whole(2): value(of, place) for name, (place, _) in SHELL_FIELDS.items() for of in cards.elements[name] if of.field(place)}
+    found = {}
+    for n in elements:
+        found.setdefault(own.get(n, usual), []).append(n)
+    return found
 
 
 def read_materials(cards, deck):
@@ -120,11 +135,9 @@ def read_properties(cards, deck, of_property):
             if thickness:
                 model.notes.append(f"the thickness {thickness:g} of PSHELL {pid}, whose elements lie on solids: {shown} "
                                    "is a surface; a [[part]] with a thickness makes shells of it")
-        elif flat and any(len(model.elements[n][1]) > 4 for n in flat):
-            model.notes.append(f"{len(bare)} quadratic flat elements of property {pid}, which lie on no solid: shells have 3 or "
-                               "4 nodes")
         elif flat:
-            model.parts[model.unused(name if not solid else name + "_shells")] = Part(flat, material, thickness)
+            for offset, of in offsets_of(cards, card, thickness, flat).items():
+                model.parts[model.unused(name if not solid else name + "_shells")] = Part(of, material, thickness, offset)
             note_shell_property(card, model)
 
 

@@ -10,7 +10,7 @@ from squeal.mesh_model import KINDS
 UNITS = {"at": (1, 0), "mass": (-1, 1), "inertia": (1, 1), "stiffness": (-1, 1), "damping": (-1, 1), "vector": (0, 1),
          "moment": (1, 1), "value": (-2, 1), "tension": (0, 1), "velocity": (1, 0), "centre": (1, 0), "compliance": (3, -1),
          "slip_compliance": (3, -1), "young": (-2, 1), "shear": (-2, 1), "density": (-4, 1), "area": (2, 0), "bending": (4, 0),
-         "torsion": (4, 0), "diameter": (1, 0), "thickness": (1, 0), "displacement": (1, 0), "decay_speed": (1, 0),
+         "torsion": (4, 0), "diameter": (1, 0), "thickness": (1, 0), "offset": (1, 0), "displacement": (1, 0), "decay_speed": (1, 0),
          "reach": (1, 0), "gap": (1, 0), "gravity": (1, 0)}
 SINGLE = ("friction", "modes", "damping", "estimate", "mesh")  # tables that there is one of
 ALIKE = 5  # notes that differ by numbers alone, of which all are shown
@@ -182,6 +182,7 @@ def material(model, part):
     keys["density"] = known["density"] if known.get("density") else f"FILL IN [kg/m3]: {lacks}"
     damping = {**known, "loss_factor": known.get("loss_factor", 0) + model.loss_factor}
     keys |= {key: damping[key] for key in ("loss_factor", "alpha", "beta") if damping.get(key)}
+    keys |= {"offset": part.offset} if part.offset else {}
     if shells:
         keys["thickness"] = part.thickness or "FILL IN [m]: these are shells; or remove this part, if they are the surface of a solid"
     return keys

@@ -15,8 +15,8 @@ PYRAMID_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))
 # Solids by XDMF's code: number of nodes, faces, edges that have a mid-side node.
 SOLIDS = {9: (8, HEX, ()), 48: (20, HEX, HEX_EDGES), 50: (27, HEX, HEX_EDGES), 8: (6, WEDGE, ()), 40: (15, WEDGE, WEDGE_EDGES),
           41: (18, WEDGE, WEDGE_EDGES), 7: (5, PYRAMID, ()), 39: (13, PYRAMID, PYRAMID_EDGES), 6: (4, TETRA, ()), 38: (10, TETRA, TETRA_EDGES)}
-SHELLS = {5: 4, 4: 3}  # number of nodes
-VTK = {9: 12, 48: 25, 50: 29, 8: 13, 40: 26, 41: 32, 7: 14, 39: 27, 6: 10, 38: 24, 5: 9, 4: 5}  # its number of each kind; the order of nodes is the same
+SHELLS = {5: 4, 4: 3, 36: 6, 37: 8, 35: 9}  # number of nodes
+VTK = {9: 12, 48: 25, 50: 29, 8: 13, 40: 26, 41: 32, 7: 14, 39: 27, 6: 10, 38: 24, 5: 9, 4: 5, 36: 22, 37: 23, 35: 28}  # its number of each kind; the order of nodes is the same
 POINT = 1  # its number of nodes follows
 
 
@@ -47,12 +47,18 @@ def _rim(code, nodes):
         yield rim
 
 
+def _shell_rim(nodes):
+    """The nodes round a shell, mid-side ones between their corners."""
+    corners = 3 if len(nodes) in (3, 6) else 4
+    return nodes if len(nodes) == corners else [n for k in range(corners) for n in (nodes[k], nodes[corners + k])]
+
+
 def outer(elements):
     """Faces of the outer surface of these elements, each as the nodes round it: those of one solid only, outward; and shells."""
     shells, met = [], {}
     for code, nodes in elements:
         if code in SHELLS:
-            shells.append(nodes)
+            shells.append(_shell_rim(nodes))
             continue
         for rim in _rim(code, nodes):
             met.setdefault(frozenset(rim), []).append(rim)
@@ -77,7 +83,7 @@ def volume(elements, nodes, thickness):
     total = 0.0
     for code, of in elements:
         if code in SHELLS:
-            a, b, c = np.moveaxis(triangles(nodes[of]), 1, 0)
+            a, b, c = np.moveaxis(triangles(nodes[_shell_rim(of)]), 1, 0)
             total += thickness * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
             continue
         for rim in _rim(code, of):

@@ -13,7 +13,7 @@ namespace squeal
 {
 
 /// Shapes of elements and their faces. Nodes are ordered as gmsh numbers them: corners, mid-side nodes, middles.
-/// Elements are solids, or shells of 3 and 4 nodes.
+/// Elements are solids, or shells if they are faces.
 enum class Shape
 {
   line2,
@@ -70,6 +70,7 @@ struct Mesh
   std::map<std::string, std::vector<Face>> surfaces;       // of every named surface, those of shells included
   std::map<std::string, std::vector<int>> node_groups;     // nodes of every named group of any dimension, ascending
   std::map<std::string, std::vector<int>> dimensions;      // of every named group: 1 has curves, 3 solids, ascending
+  std::map<int, std::vector<Vec3>> normals;                // [-] at the nodes of each shell, by its place in elements
   std::map<std::string, int> points;                       // node of every scene point, rigid body and coupling
   std::vector<std::vector<int>> beams;                     // nodes of each of the scene's, from end to end
   std::vector<std::vector<SuperelementRow>> superelements; // in the scene's order

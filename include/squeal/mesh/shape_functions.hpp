@@ -67,6 +67,10 @@ std::span<const int> nodes_of(const Face& face);
 /// Returns where nodes are [m].
 std::vector<Vec3> positions_of(const Mesh& mesh, std::span<const int> nodes);
 
+/// Returns the arms [m] from the nodes of an element to its middle surface, which a shell's offset [m] moves along its
+/// normals.
+std::vector<Vec3> arms_of(const Mesh& mesh, std::size_t element, double offset);
+
 /// Returns the corners that each further node is in the middle of: 2 of a side, then 4 of a face, 8 of a box.
 const std::vector<std::vector<int>>& middles_of(Shape shape);
 

@@ -82,6 +82,7 @@ struct Part
   std::optional<RayleighDamping> damping; // if absent, the scene's
   double loss_factor = 0;                 // [-] eta of the stiffness K (1 + i eta)
   std::optional<Rotation> rotation{};     // of a solid of revolution that spins; if absent, it is at rest
+  double offset = 0;                      // [m] of a shell: from its nodes to its middle surface, along its normal
 };
 
 /// A node of its own: a point mass, or an end of springs.

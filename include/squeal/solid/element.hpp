@@ -4,8 +4,9 @@
 /// hex8, wedge6: incompatible modes in Taylor's corrected form. Both pass the patch test on any shape; hex8 does not
 ///     lock in bending, wedge6 does and is for filling.
 /// Others: isoparametric, with full integration. tet4 and pyramid5 lock in bending.
-/// shell4, shell3: flat with transverse shear (DKMQ, DKMT) and drilling rotations, six degrees of freedom a node.
-///     Warped quadrilaterals have rigid links from the nodes to their plane.
+/// quad4, triangle3: flat shells with transverse shear (DKMQ, DKMT) and drilling rotations, six degrees of freedom a
+///     node. Rigid links go from the nodes to the plane of a warped quadrilateral, and to a middle surface beside them.
+/// quad8, quad9, triangle6: shells that consist of these.
 /// Sources and caveats stand at each kernel. The mass follows from the same motion as the stiffness: it includes the
 /// incompatible modes, and the curvature of shell sides between rotated ends.
 #include "squeal/mesh/mesh.hpp"
@@ -27,9 +28,11 @@ struct ElementMatrices
   Eigen::MatrixXd mass;      // [kg, kg m, kg m2]
 };
 
-/// Returns the matrices of an element with nodes at x [m]. Shells alone use the thickness [m].
-/// Throws std::runtime_error with the Jacobian if it is not positive at an integration point.
-ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Material& material, double thickness);
+/// Returns the matrices of an element with nodes at x [m]. Shells alone use the thickness [m], and the arms [m] from
+/// the nodes to the middle surface; without arms it is at the nodes. Throws std::runtime_error with the Jacobian if it
+/// is not positive at an integration point.
+ElementMatrices element_matrices(Shape shape, std::span<const Vec3> x, const Material& material, double thickness,
+                                 std::span<const Vec3> arms = {});
 
 /// Returns the stress xx yy zz xy yz zx [Pa] at the integration points of a solid under the nodal displacements u [m],
 /// 3 a node.
