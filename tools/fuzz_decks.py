@@ -381,5 +381,18 @@ LOOKUP_TABLE default
 2
 """
 
+# a shell of 8 nodes and one of 6 beside it, whose upper surface has the nodes
+PLATE = [(0, 0), (2, 0), (2, 1), (0, 1), (1, 0), (2, .5), (1, 1), (0, .5), (4, 0), (3, 0), (3, .5)]
+SHELLS = {
+    "shells.inp": "*NODE\n" + "".join(f"{i}, {x}, {y}, 0\n" for i, (x, y) in enumerate(PLATE, 1))
+    + "*ELEMENT, TYPE=S8R, ELSET=plate\n1, 1,2,3,4,5,6,7,8\n*ELEMENT, TYPE=STRI65, ELSET=plate\n2, 2,9,3,10,11,6\n*MATERIAL, NAME=m\n*ELASTIC\n"
+    "2e11, 0.25\n*DENSITY\n7800\n*SHELL SECTION, ELSET=plate, MATERIAL=m, OFFSET=SPOS\n0.125\n*NSET, NSET=base\n1, 4, 8\n*BOUNDARY\nbase, 1, 6\n",
+    "shells.bdf": "BEGIN BULK\n" + "".join(f"GRID,{i},,{x:.1f},{y:.1f},0.\n" for i, (x, y) in enumerate(PLATE, 1))
+    + "CQUAD8,1,1,1,2,3,4,5,6\n,7,8,,,,,,-.0625\nCTRIA6,2,1,2,9,3,10,11,6\n,,TOP\nPSHELL,1,1,.125,1\nMAT1,1,2.+11,,.25,7800.\nSPC1,1,123456,1,4,8\n",
+    "shells.cdb": "/PREP7\nET,1,281\nNBLOCK,6,SOLID,11,11\n(3i9,6e21.13e3)\n"
+    + "".join(f"{i:9d}{0:9d}{0:9d}{x:21.13E}{y:21.13E}\n" for i, (x, y) in enumerate(PLATE, 1)) + "N,R5.3,LOC,       -1,\nEBLOCK,19,SOLID,2,2\n(19i9)\n"
+    + wide(1, 1, 1, 1, 0, 0, 0, 0, 8, 0, 1, *range(1, 9)) + wide(1, 1, 1, 1, 0, 0, 0, 0, 8, 0, 2, 2, 9, 3, 3, 10, 11, 3, 6)
+    + "       -1\nSECTYPE,1,SHELL\nSECDATA,0.125,1\nSECOFFSET,TOP\nMP,EX,1,2e11\nMP,NUXY,1,0.25\nMP,DENS,1,7800\nD,1,ALL,0.\nD,4,ALL,0.\nFINISH\n"}
+
 DECKS = {"deck.inp": ABAQUS, "parts.inp": PARTS, "deck.bdf": NASTRAN, "deck.cdb": ANSYS, "deck.unv": UNIVERSAL, "deck.fem": OPTISTRUCT,
-         "ds.dat": WORKBENCH, "blocks.cdb": BLOCKS, "calculix.inp": CALCULIX, "deck.vtk": VTK}
+         "ds.dat": WORKBENCH, "blocks.cdb": BLOCKS, "calculix.inp": CALCULIX, "deck.vtk": VTK, **SHELLS}

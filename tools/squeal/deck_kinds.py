@@ -40,6 +40,7 @@ def kind_of(file):
     return best if found[best] else ENDINGS.get(file.suffix.lower(), "")
 
 
+@np.errstate(invalid="ignore", over="ignore")  # of numbers beyond all sizes, which are refused by a message
 def read_deck(file, size=0.0):
     if not file.is_file():
         raise Problem(f"there is no file {file}")
