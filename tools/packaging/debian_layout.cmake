@@ -28,3 +28,11 @@ execute_process(COMMAND sed -i -e "1s|^#!/usr/bin/env python3|#!/usr/bin/python3
 # import squeal
 file(MAKE_DIRECTORY ${usr}/lib/python3/dist-packages)
 file(CREATE_LINK ../../../share/squeal/tools/squeal ${usr}/lib/python3/dist-packages/squeal SYMBOLIC)
+
+# One manual page of both programs.
+set(manuals ${usr}/share/man/man1)
+file(COPY ${packaging}/squeal.1 DESTINATION ${manuals} FILE_PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
+execute_process(COMMAND gzip -9n ${manuals}/squeal.1 COMMAND_ERROR_IS_FATAL ANY)
+if(EXISTS ${usr}/bin/squeal_mesher)
+  file(CREATE_LINK squeal.1.gz ${manuals}/squeal_mesher.1.gz SYMBOLIC)
+endif()
