@@ -331,7 +331,7 @@ bool is_open(const Motion& motion)
 {
   const Fidelity& fidelity = motion.fidelity;
   return succeeded(motion.cycle.outcome) && motion.cycle.multipliers.stability == Stability::undecided &&
-         std::max(fidelity.step_frequency_error, fidelity.step_energy_error) > fidelity.accuracy / 2;
+         !(std::max(fidelity.step_frequency_error, fidelity.step_energy_error) <= fidelity.accuracy / 2);
 }
 
 constexpr int finest = 1024; // steps a period

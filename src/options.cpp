@@ -76,7 +76,7 @@ SceneKeys options_of(ProgramOptions& options)
        "that decides what a bar leaves open, at most 200, as the search took or as is affordable"},
       {"-settled_periods", &options.settled.periods, "-",
        "largest number of periods integrated to see what a motion settles on where no cycle attracts; 0: 2048, or 512 "
-       "where periods are dear",
+       "where periods are dear or have more than 256 steps",
        Rule::not_negative},
       {"-settled_exponents", &options.settled.exponents, "-", "number of Lyapunov exponents of a settled motion",
        Rule::positive},

@@ -311,7 +311,8 @@ void take_as_answer(const SettledMotion& motion, Outcome& of_cycle)
 SettledMotion find_settled_motion(const CycleProblem& problem, const LimitCycle& cycle, SettledOptions options)
 {
   const double of_period = cycle.steps_per_period * work_of_step(problem.sliding.structure);
-  if (options.periods == 0) options.periods = is_dear(of_period) ? 512 : 2048;
+  constexpr int many = 256; // steps, beside which a small model's entries do not tell the time
+  if (options.periods == 0) options.periods = is_dear(of_period) || cycle.steps_per_period > many ? 512 : 2048;
   const Windows windows{problem, cycle.free.period, cycle.theta, cycle.steps_per_period};
   const double step = windows.length / windows.steps;
   SettledMotion motion;

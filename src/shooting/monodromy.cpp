@@ -53,19 +53,6 @@ std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::Ve
   return place;
 }
 
-std::vector<std::size_t> add_changes(const std::vector<std::complex<double>>& values,
-                                     const std::vector<std::complex<double>>& others, double part, GridErrors& grid)
-{
-  std::vector<std::size_t> places = nearest_places(values, others);
-  for (std::size_t i = 0; i < values.size(); ++i)
-  {
-    const std::complex<double> other = others[places[i]];
-    grid.errors[i] += part * std::abs(other - values[i]);
-    grid.rises[i] += part * std::max(0., std::abs(other) - std::abs(values[i]));
-  }
-  return places;
-}
-
 Crossing crossing_of(std::complex<double> multiplier)
 {
   if (multiplier.imag() != 0) return Crossing::neimark_sacker;

@@ -28,28 +28,6 @@ FastestMotion fastest_motion(const Flow& flow, const DenseEigenpair& pair,
 /// The place of the shift in time among the pairs: near 1, with the vector that is closest to the flow.
 std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::VectorXd& flow);
 
-/// A grid of time beside the orbit's own, and the part of what multipliers change by on it that is taken for an error.
-struct OtherGrid
-{
-  TimeGrid grid;
-  double part = 1;
-};
-
-/// Moved by half a step, and of twice as many: the change on this one is 3/4 of the error of a step of order 2.
-inline constexpr std::array other_grids = {OtherGrid{{0.5, 1}, 1}, OtherGrid{{0, 2}, 4. / 3}};
-
-/// The change of each value between grids of time: the distance to its partner, and the rise of its modulus.
-struct GridErrors
-{
-  explicit GridErrors(std::size_t values) : errors(values, 0.), rises(values, 0.) {}
-
-  std::vector<double> errors, rises;
-};
-
-/// Adds the parts of the changes to the nearest of `others`, at least as many. Returns the places of these.
-std::vector<std::size_t> add_changes(const std::vector<std::complex<double>>& values,
-                                     const std::vector<std::complex<double>>& others, double part, GridErrors& grid);
-
 /// Whether larger multipliers than those found are to be expected, and how to find out.
 struct Completeness
 {

@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numeric>
 
 namespace squeal
 {
@@ -17,43 +19,64 @@ namespace
 using Complex = std::complex<double>;
 using Eigen::Index;
 
-/// The multipliers of these places over eight periods on a grid of 8 N + 1 steps, by projection on the vectors of all.
-/// Each is then taken to a period by the root nearest to its value.
+constexpr double decays = 0.7; // a period: such a motion decides nothing
+
+/// The multipliers, with those of slow motions and of the shift in time along eight periods on a grid of 8 N + 1 steps,
+/// by projection on the vectors of all of them: what each is a period is the root that is nearest to the value. Empty:
+/// they are not finite. Adds its columns.
 std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const WholeSpace& space,
-                                         const std::vector<DenseEigenpair>& pairs, const std::vector<Index>& places)
+                                         const std::vector<DenseEigenpair>& pairs, std::size_t shift, long& columns)
 {
   constexpr int periods = 8;
   const Orbit& orbit = monodromy.orbit;
+  std::vector<Complex> values = values_of(pairs), powers;
+  std::vector<Index> places;
+  for (std::size_t i = 0; i < values.size(); ++i)
+  {
+    if (!(std::abs(values[i]) > decays) && i != shift) continue;
+    places.push_back(static_cast<Index>(i));
+    powers.push_back(std::pow(values[i], periods));
+  }
+  columns += periods * static_cast<long>(places.size());
   const Eigen::MatrixXd V = real_columns(pairs, space.right.columns());
   monodromy.flow.record_period(periods * orbit.period, orbit.state, {0, periods, 1});
   const Eigen::MatrixXd image =
       inner_products(space.left, image_of(monodromy, combination(space.right, V(Eigen::all, places))));
+  monodromy.flow.record_period(orbit.period, orbit.state, {});
   // vectors of motions that contact takes away may be parallel: they have no part in the others' rows
   const Eigen::MatrixXd projected = V.completeOrthogonalDecomposition().solve(image)(places, Eigen::all);
   if (!projected.allFinite()) return {};
 
-  std::vector<Complex> values, powers;
-  for (const Index place : places) values.push_back(pairs[static_cast<std::size_t>(place)].lambda);
-  for (const Complex value : values) powers.push_back(std::pow(value, periods));
   const std::vector<Complex> found = values_of(solve_dense_unsymmetric(projected));
   const std::vector<std::size_t> partners = nearest_places(powers, found);
-  for (std::size_t i = 0; i < values.size(); ++i)
+  for (std::size_t i = 0; i < places.size(); ++i)
   {
-    const Complex first = std::pow(found[partners[i]], 1. / periods), value = values[i];
-    for (int k = 0; k < periods; ++k)
+    Complex& value = values[static_cast<std::size_t>(places[i])];
+    const Complex first = std::pow(found[partners[i]], 1. / periods), own = value;
+    value = first;
+    for (int k = 1; k < periods; ++k)
     {
       const Complex root = first * std::polar(1., two_pi * k / periods);
-      if (k == 0 || std::abs(root - value) < std::abs(values[i] - value)) values[i] = root;
+      if (std::abs(root - own) < std::abs(value - own)) value = root;
     }
   }
   return values;
 }
 
-/// All multipliers. Bars: the change of each when the grid moves by half a step, and 4/3 of the change at twice the
-/// steps, the error of a step of order 2. Where contact hits a mass within a step depends on the grid: a whole number
-/// of steps a period places each impact at one point of its step. So the bars hold as well what changes along eight
-/// periods in 8 N + 1 steps, which place it at eight points. Bars of real multipliers hold by how much that of the
-/// shift in time misses 1 on either grid.
+/// The bar of a modulus, from what one point of each step differs by from the mean of eight, and what a grid moved by
+/// half a step and one of twice as many change. Half a step tells what is of the place of events in their steps.
+double bar_of_modulus(double from_mean, double later, double finer, bool is_mean)
+{
+  constexpr double of_order_2 = 4. / 3; // of what twice as many steps change
+  if (!is_mean) return std::abs(later) + of_order_2 * std::abs(finer);
+  return std::max(std::abs(from_mean), std::abs(from_mean + later)) / 2 + // an eighth, or by chance some more
+         2 * std::max(0., std::abs(finer) - std::abs(later));             // the orbit has such an error, too
+}
+
+/// All multipliers. An event of contact comes at some point of its step, and moves a multiplier by what that allows: a
+/// grid with a whole number of steps a period places each event at one point, eight periods in 8 N + 1 steps at eight.
+/// So those of slow motions are the mean of these. Bars of real multipliers hold by how much that of the shift in time
+/// misses 1.
 FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
 {
   FloquetAnalysis result;
@@ -70,60 +93,44 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
     finite = finite && whole.allFinite();
     return finite ? solve_dense_unsymmetric(whole) : std::vector<DenseEigenpair>();
   };
-  std::vector<DenseEigenpair> pairs = pairs_on({});
-  std::vector<std::vector<DenseEigenpair>> on_others; // the other grids
-  for (const OtherGrid& other : other_grids) on_others.push_back(pairs_on(other.grid));
-  monodromy.flow.record_period(orbit.period, orbit.state, {});
-  const auto of_tangent_that_is_not_finite = [&]
+  const std::vector<DenseEigenpair> pairs = pairs_on({});
+  const std::vector<Complex> own = values_of(pairs), later = values_of(pairs_on({0.5, 1})),
+                             finer = values_of(pairs_on({0, 2}));
+  const Owned<Vec> rate = copy_of(orbit.rate.get());
+  const std::size_t shift = find_shift(pairs, inner_products(space.left, block_of(std::span(&rate, 1))).col(0));
+  // over eight periods the orbit's own error must not lead away from it
+  const bool stays = finite && std::pow(std::max(1., std::abs(own.front())), 8) * orbit.residual < 1e-2;
+  std::vector<Complex> values = own;
+  if (stays) values = along_eight_periods(monodromy, space, pairs, shift, multipliers.periods);
+  if (!finite || values.empty())
   {
     multipliers.stability = Stability::undecided;
     multipliers.would_decide = "the tangent of this period is not finite: other steps a period would decide";
-    return std::move(result);
-  };
-  if (!finite) return of_tangent_that_is_not_finite();
-  const std::vector<Complex> values = values_of(pairs);
-  GridErrors grid(values.size());
-  for (std::size_t k = 0; k < on_others.size(); ++k)
-    add_changes(values, values_of(on_others[k]), other_grids[k].part, grid);
-  const Owned<Vec> rate = copy_of(orbit.rate.get());
-  const std::size_t shift = find_shift(pairs, inner_products(space.left, block_of(std::span(&rate, 1))).col(0));
-  multipliers.trivial_error = std::abs(values[shift] - 1.);
-  // over eight periods the orbit's own error must not lead away from it
-  const bool stays = std::pow(std::max(1., std::abs(values.front())), 8) * orbit.residual < 1e-2;
-  if (stays)
-  {
-    constexpr double decays = 0.7; // a period: such a motion decides nothing
-    std::vector<Index> places;
-    for (std::size_t i = 0; i < values.size(); ++i)
-      if (std::abs(values[i]) > decays || i == shift) places.push_back(static_cast<Index>(i));
-    const std::vector<Complex> others = along_eight_periods(monodromy, space, pairs, places);
-    multipliers.periods += static_cast<long>(8 * places.size());
-    monodromy.flow.record_period(orbit.period, orbit.state, {});
-    if (others.empty()) return of_tangent_that_is_not_finite();
-    for (std::size_t k = 0; k < others.size(); ++k)
-    {
-      const auto i = static_cast<std::size_t>(places[k]);
-      constexpr double with_its_own = 1.5; // error: an eighth of this grid's, or by chance some more
-      grid.errors[i] = std::max(grid.errors[i], with_its_own * std::abs(others[k] - values[i]));
-      grid.rises[i] = std::max(grid.rises[i], with_its_own * (std::abs(others[k]) - std::abs(values[i])));
-      if (i == shift) multipliers.trivial_error = std::max(multipliers.trivial_error, std::abs(others[k] - 1.));
-    }
+    return result;
   }
-  for (std::size_t i = 0; i < values.size(); ++i)
+  if (!stays) monodromy.flow.record_period(orbit.period, orbit.state, {});
+  multipliers.trivial_error = std::max(std::abs(own[shift] - 1.), std::abs(values[shift] - 1.));
+  const std::vector<std::size_t> at_later = nearest_places(own, later), at_finer = nearest_places(own, finer);
+  std::vector<std::size_t> order(values.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  order.erase(order.begin() + static_cast<std::ptrdiff_t>(shift));
+  std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) { return std::abs(values[i]); });
+  for (const std::size_t i : order)
   {
-    if (i == shift) continue;
     constexpr double rounding = 1e-9;
-    const double least = std::max(rounding, stays ? moved_by_grid(multipliers, values[i]) : multipliers.trivial_error);
+    const double size = std::abs(values[i]), before = std::abs(own[i]);
+    const double bar = bar_of_modulus(before - size, std::abs(later[at_later[i]]) - before,
+                                      std::abs(finer[at_finer[i]]) - before, stays && before > decays);
+    const double of_grid = before > decays || !stays ? moved_by_grid(multipliers, values[i]) : 0;
     multipliers.values.push_back(values[i]);
-    multipliers.errors.push_back(std::max(grid.errors[i], least));
-    multipliers.upper.push_back(std::abs(values[i]) + std::max(grid.rises[i], least));
+    multipliers.errors.push_back(std::max({bar, of_grid, rounding}));
+    multipliers.upper.push_back(size + multipliers.errors.back());
   }
-  pairs.erase(pairs.begin() + static_cast<std::ptrdiff_t>(shift));
-  if (pairs.empty()) return result;
+  if (order.empty()) return result;
   decide(multipliers, {true, ""});
   const auto combined = [&](const Eigen::VectorXd& y)
   { return std::move(states_of(combination(space.right, y), orbit.state).front()); };
-  result.fastest = fastest_motion(monodromy.flow, pairs[deciding_place(multipliers)], combined);
+  result.fastest = fastest_motion(monodromy.flow, pairs[order[deciding_place(multipliers)]], combined);
   return result;
 }
 
