@@ -167,6 +167,14 @@ def test_every_chapter_of_a_room_is_cited_there():
     assert not missing, missing
 
 
+def test_pages_name_sources_that_are_there():
+    names = {f.name for f in sources("src", "include", "tests")}
+    pages = [ROOT / "README.md", *(p for folder in ("src", "inputs", "tools") for p in (ROOT / folder).rglob("*.md"))]
+    wrong = [f"{page.relative_to(ROOT)} names {name}" for page in pages
+             for name in re.findall(r"`[\w/]*?(\w+\.[ch]pp)`", page.read_text()) if name not in names]
+    assert not wrong, "\n".join(wrong)
+
+
 def test_sources_are_formatted():
     files = [str(f) for f in sources("src", "include", "tests")]
     done = subprocess.run(["clang-format", "--dry-run", "--Werror", *files], capture_output=True, text=True)
