@@ -91,7 +91,7 @@ UnstableModes modes_sought(const MotionSearch& search)
 std::optional<GivenStart> cycle_start(const MotionSearch& search, const CycleSettings& settings)
 {
   const auto copied = [](const GivenStart& known) {
-    return GivenStart{copy_of(known.state), known.period, known.rounds};
+    return GivenStart{copy_of(known.state), known.period, known.rounds, known.resumed};
   };
   if (search.settled_on) return copied(*search.settled_on);
   if (search.resumed) return copied(*search.resumed);

@@ -268,7 +268,7 @@ std::string no_reduced_search(const CycleProblem& problem, CycleModel asked)
 {
   if (problem.unstable.modes.size() > 1)
     return "several modes are unstable: only the full model's shooting excites them all";
-  if (asked == CycleModel::automatic && problem.start && problem.start->period > 0)
+  if (asked == CycleModel::automatic && problem.start && problem.start->period > 0 && !problem.start->resumed)
     return "the search starts from a cycle that is nearly known, which the full model takes up at once";
   return {};
 }
@@ -289,6 +289,8 @@ std::string find_by_reduced_model(CycleProblem& problem, const CycleOptions& opt
   const Owned<Vec> state = copy_of(reduced.motion.get());
   check(VecAXPY(displacement(state), 1, problem.sliding.equilibrium.u));
   ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), reduced.period};
+  if (const GivenStart& given = *problem.start; given.resumed && !asked)
+    start = {problem.sliding.equilibrium.u, given.state.u, given.state.v, given.period};
   start.is_cycle = true;
   LimitCycle& cycle = found.cycle;
   cycle = asked ? measured_on_full_model(problem, options, start)

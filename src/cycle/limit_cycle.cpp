@@ -41,7 +41,7 @@ void describe_orbit(Checkpoint& checkpoint, const Structure& structure, const st
 
 std::optional<GivenStart> kept_cycle(const Structure& structure)
 {
-  GivenStart orbit{{zeros_like(structure.load), zeros_like(structure.load), 0, {}}};
+  GivenStart orbit{{zeros_like(structure.load), zeros_like(structure.load), 0, {}}, 0, 1, true};
   const auto describe = [&](Checkpoint& checkpoint) {
     describe_orbit(checkpoint, structure, {orbit.state.u, orbit.state.v}, orbit.period);
   };
@@ -290,7 +290,7 @@ LimitCycle find_cycle_from_start(CycleProblem& problem, const CycleOptions& opti
                        std::nan("")};
     return skipped;
   }
-  const auto& [state, period, rounds] = *problem.start;
+  const auto& [state, period, rounds, resumed] = *problem.start;
   const bool is_cycle = period > 0; // it needs no free periods
   ShootingStart start{equilibrium.u,
                       state.u,

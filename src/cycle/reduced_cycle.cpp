@@ -203,7 +203,7 @@ std::string find_first_reduced_cycle(ReducedSearch& search, ReducedCycle& cycle)
   CycleProblem& problem = search.problem;
   const ComplexMode& mode = problem.unstable.modes.front();
   if (!problem.start) return "there is no amplitude to start from";
-  constexpr double expected = 2.5; // times the start: to grow beyond it costs a second model and its periods
+  const double expected = problem.start->resumed ? 1 : 2.5; // times the start: beyond it a second model is made
   const State& start = problem.start->state;
   const double first = equivalent_amplitude(problem, start);
   const Owned<Vec> estimated = fluctuation_of(problem, start);

@@ -49,9 +49,9 @@ struct ReducedModel;
 struct GivenStart
 {
   State state;
-  double period =
-      0;          // [s] of the cycle that it is nearly, which needs no free periods; 0: none, and the mode's is taken
-  int rounds = 1; // as many as the period may be of the cycle
+  double period = 0;    // [s] of the cycle that it nearly is, without free periods; 0: none, and the mode's is taken
+  int rounds = 1;       // as many as the period may be of the cycle
+  bool resumed = false; // the orbit that a run that is gone on with had reached
 };
 
 /// The brake about its sliding equilibrium, and what is asked of its cycle.

@@ -44,14 +44,12 @@ struct ShootingStart
 {
   Vec equilibrium = nullptr; // u0 [m]
   Vec u = nullptr, v = nullptr;
-  double period = 0; // [s]
-  std::vector<Vec>
-      shapes{}; // the paper's phi_r, phi_i, phi_e: of the displacements and of the velocities alike; or none
+  double period = 0;              // [s]
+  std::vector<Vec> shapes{};      // the paper's phi_r, phi_i, phi_e, of displacements and velocities alike; or none
   std::size_t other_unstable = 0; // unstable modes that an orbit may leave unexcited
-  double first_event =
-      std::numeric_limits<double>::infinity(); // energy norm where a nonlinearity begins to limit growth
-  bool is_cycle = false;                       // that of a cheaper model, or on which a motion has settled
-  int rounds = 1;                              // of a cycle: as many as the period may be of it
+  double first_event = HUGE_VAL;  // energy norm where a nonlinearity begins to limit growth
+  bool is_cycle = false;          // that of a cheaper model, or on which a motion has settled
+  int rounds = 1;                 // of a cycle: as many as the period may be of it
 };
 
 /// The settings of one solve.
