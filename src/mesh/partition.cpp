@@ -5,12 +5,12 @@
 /// its nodal degrees of freedom.
 #include "squeal/mesh/contact_pairs.hpp"
 
-#include "squeal/base/disjoint_sets.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/base/run_control.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 
 #include <algorithm>
+#include <boost/pending/disjoint_sets.hpp>
 #include <metis.h>
 #include <numeric>
 
@@ -29,11 +29,15 @@ struct Vertices
 /// Merges the two heaviest nodes of each pair, and of pairs that share one, into one vertex.
 Vertices merge_pairs(std::size_t nodes, const std::vector<ContactPair>& pairs)
 {
-  DisjointSets sets(nodes);
-  for (const ContactPair& pair : pairs) sets.join(pair.rotor_node, pair.stator_node);
-  Vertices vertices{std::vector<int>(nodes), 0};
-  for (int i = 0; i < sets.size(); ++i)
-    vertices.of_node[i] = sets.least(i) == i ? vertices.count++ : vertices.of_node[sets.least(i)];
+  boost::disjoint_sets_with_storage<> sets(nodes);
+  for (const ContactPair& pair : pairs) sets.union_set(pair.rotor_node, pair.stator_node);
+  Vertices vertices;
+  std::vector<int> of_set(nodes, -1);
+  for (std::size_t node = 0; node < nodes; ++node)
+  {
+    int& vertex = of_set[sets.find_set(node)];
+    vertices.of_node.push_back(vertex < 0 ? vertex = vertices.count++ : vertex);
+  }
   return vertices;
 }
 

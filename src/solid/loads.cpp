@@ -4,11 +4,11 @@
 /// Beside T q a nodal degree of freedom may have a motion s that is known: what a support prescribes, or the shortening
 /// of a bolt, which the elements on one side of its section see. Its load is -T' K s; that of gravity is T' M a.
 #include "contributions.hpp"
-#include "squeal/base/disjoint_sets.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 
 #include <algorithm>
+#include <boost/pending/disjoint_sets.hpp>
 #include <map>
 #include <set>
 
@@ -220,8 +220,8 @@ std::vector<int> elements_above(const Mesh& mesh, const Bolt& bolt, const std::v
   const Around found = around(mesh, section);
   const auto place_of = [&](int element)
   { return static_cast<int>(std::ranges::lower_bound(found.elements, element) - found.elements.begin()); };
-  DisjointSets patches(found.elements.size()); // joined by faces that are not of the section
-  std::vector<std::array<int, 2>> across;      // places of the elements below and above each face of the section
+  boost::disjoint_sets_with_storage<> patches(found.elements.size()); // joined by faces that are not of the section
+  std::vector<std::array<int, 2>> across; // places of the elements below and above each face of the section
   for (const auto& [face, elements] : found.faces)
   {
     if (elements.size() != 2) continue;
@@ -230,16 +230,16 @@ std::vector<int> elements_above(const Mesh& mesh, const Bolt& bolt, const std::v
     if (std::ranges::all_of(face, [&](int node) { return is_on(section, node); }))
       across.push_back({low, high});
     else
-      patches.join(low, high);
+      patches.union_set(low, high);
   }
   if (across.empty()) fail("has no face between two solid elements");
-  std::set<int> below, above;
-  for (const auto& [low, high] : across) below.insert(patches.least(low)), above.insert(patches.least(high));
-  if (std::ranges::any_of(below, [&](int patch) { return above.contains(patch); }))
+  std::set<std::size_t> below, above;
+  for (const auto& [low, high] : across) below.insert(patches.find_set(low)), above.insert(patches.find_set(high));
+  if (std::ranges::any_of(below, [&](std::size_t patch) { return above.contains(patch); }))
     fail("does not cut the shank through: both of its sides are joined beside it");
   std::vector<int> result;
   for (const int element : found.elements)
-    if (const int patch = patches.least(place_of(element)); above.contains(patch))
+    if (const std::size_t patch = patches.find_set(place_of(element)); above.contains(patch))
       result.push_back(element);
     else if (!below.contains(patch))
       fail("has nodes of other solids");

@@ -1,9 +1,9 @@
 #include "point_modes.hpp"
 
 #include "squeal/algebra/dense_matrix.hpp"
-#include "squeal/base/disjoint_sets.hpp"
 
 #include <algorithm>
+#include <boost/pending/disjoint_sets.hpp>
 #include <cmath>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -68,21 +68,21 @@ struct Cluster
 
 /// The parts of the graph in which modes of both points are linked that share more than a trace, of those that are
 /// free.
-std::map<int, Cluster> clusters_of(const MatrixXd& macs, const std::vector<char>& free_from,
-                                   const std::vector<char>& free_to)
+std::map<std::size_t, Cluster> clusters_of(const MatrixXd& macs, const std::vector<char>& free_from,
+                                           const std::vector<char>& free_to)
 {
   constexpr double trace = 0.02;
   const int first = static_cast<int>(free_from.size()), second = static_cast<int>(free_to.size());
-  DisjointSets sets(free_from.size() + free_to.size());
+  boost::disjoint_sets_with_storage<> sets(free_from.size() + free_to.size());
   for (int i = 0; i < first; ++i)
     for (int j = 0; j < second; ++j)
       if (free_from[static_cast<std::size_t>(i)] && free_to[static_cast<std::size_t>(j)] && macs(i, j) >= trace)
-        sets.join(i, first + j);
+        sets.union_set(i, first + j);
   std::map<int, Cluster> clusters;
   for (int i = 0; i < first; ++i)
-    if (free_from[static_cast<std::size_t>(i)]) clusters[sets.least(i)].from.push_back(i);
+    if (free_from[static_cast<std::size_t>(i)]) clusters[sets.find_set(i)].from.push_back(i);
   for (int j = 0; j < second; ++j)
-    if (free_to[static_cast<std::size_t>(j)]) clusters[sets.least(first + j)].to.push_back(j);
+    if (free_to[static_cast<std::size_t>(j)]) clusters[sets.find_set(first + j)].to.push_back(j);
   return clusters;
 }
 
