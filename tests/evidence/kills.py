@@ -44,13 +44,15 @@ RUNS = {  # ranks, scene and arguments
 TOLERANCES = [  # words in a number's name, its relative and its absolute tolerance
     (("multipliers",), (0, 5e-2)),  # bars of a projection and of a whole matrix differ
     (("error", "bar", "half_width"), (0.5, 1e-3)),
-    (("chatter",), (2e-2, 0)),  # of the grid of time
+    (("chatter",), (0.5, 0)),  # of the grid of time
     (("joints",), (2e-2, 0)),
+    (("cycle.mean",), (5e-3, 0)),  # the phase of an orbit places its events in the grid of time: test_joint_cycles.py
     (("",), (1e-4, 1e-9)),  # cycles are sought to 1e-5 of their state
 ]
 # of the clock, of the way to the answer, of rounding
 LEFT_OUT = ("second", "memory", "residual", "iterations", "defect", "records", "attempts", "next", "place", "command", "run",
-            "ended", "backward", "periods", "seen", "condition", "certificate", "timings", "newton", "versions", "fidelity")
+            "ended", "backward", "periods", "seen", "condition", "certificate", "timings", "newton", "versions", "fidelity",
+            "by_offset")  # a difference of two orbits, which the grid of time scatters
 
 
 def command(ranks, arguments, output, *more):
@@ -73,7 +75,7 @@ def differences(one, other, where=""):
         return lone + [found for key in one.keys() & other.keys() for found in differences(one[key], other[key], f"{where}.{key}")]
     if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
         return [found for i, (a, b) in enumerate(zip(one, other)) for found in differences(a, b, f"{where}[{i}]".lstrip("."))]
-    if where == ".heard":  # the words; its numbers stand elsewhere
+    if isinstance(one, str) and isinstance(other, str):  # the words; numbers of sentences stand elsewhere
         one, other = (re.sub(r"[\d.]+(e[+-]?\d+)?", "#", text).replace("+- #", "") for text in (one, other))
     if isinstance(one, float) and isinstance(other, (float, int)):
         relative, absolute = next(pair for words, pair in TOLERANCES if any(word in where for word in words))
