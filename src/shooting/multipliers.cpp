@@ -124,7 +124,6 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
     const double of_grid = before > decays || !stays ? moved_by_grid(multipliers, values[i]) : 0;
     multipliers.values.push_back(values[i]);
     multipliers.errors.push_back(std::max({bar, of_grid, rounding}));
-    multipliers.upper.push_back(size + multipliers.errors.back());
   }
   if (order.empty()) return result;
   decide(multipliers, {true, ""});

@@ -208,6 +208,19 @@ long watched_periods(const OrbitProblem& problem, const ShootingOptions& options
   return periods;
 }
 
+/// Widens the bar of the multiplier that decides to what the surest motion misses it by, where that is more than both
+/// bars: contact that touches and leaves within steps forgets when it did, and no grid shows it.
+void widen_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers)
+{
+  const SeenGrowth& surest = *std::ranges::min_element(seen, {}, &SeenGrowth::error);
+  const std::size_t place = deciding_place(multipliers);
+  const std::complex<double> followed = multipliers.values[place];
+  const double missed = std::abs(surest.growth - std::abs(followed));
+  if (!(missed > surest.error + multipliers.errors[place])) return;
+  for (std::size_t i = 0; i < multipliers.values.size(); ++i)
+    if (i == place || multipliers.values[i] == std::conj(followed)) multipliers.errors[i] = missed + surest.error;
+}
+
 } // namespace
 
 Owned<Vec> state_beside(const OrbitProblem& problem, const Orbit& orbit, Vec fastest, double part)
@@ -235,6 +248,7 @@ void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipli
                                       100 * nearest.part, nearest.growth);
     return;
   }
+  if (multipliers.stability == Stability::stable) widen_by_growth(seen, multipliers);
   if (multipliers.stability == Stability::unstable && !(nearest.growth - nearest.error > 1))
   {
     multipliers.stability = Stability::undecided;
