@@ -64,13 +64,13 @@ std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const Whole
 }
 
 /// The bar of a modulus, from what one point of each step differs by from the mean of eight, and what a grid moved by
-/// half a step and one of twice as many change. Half a step tells what is of the place of events in their steps.
+/// half a step and one of twice as many change it by.
 double bar_of_modulus(double from_mean, double later, double finer, bool is_mean)
 {
   constexpr double of_order_2 = 4. / 3; // of what twice as many steps change
   if (!is_mean) return std::abs(later) + of_order_2 * std::abs(finer);
-  return std::max(std::abs(from_mean), std::abs(from_mean + later)) / 2 + // an eighth, or by chance some more
-         2 * std::max(0., std::abs(finer) - std::abs(later));             // the orbit has such an error, too
+  return std::max({std::abs(from_mean) / 2, std::abs(from_mean + later) / 2, // an eighth, or by chance some more
+                   2 * std::abs(from_mean + finer)});                        // the orbit has an error of order 2, too
 }
 
 /// All multipliers. An event of contact comes at some point of its step, and moves a multiplier by what that allows: a
