@@ -78,7 +78,7 @@ std::map<std::size_t, Cluster> clusters_of(const MatrixXd& macs, const std::vect
     for (int j = 0; j < second; ++j)
       if (free_from[static_cast<std::size_t>(i)] && free_to[static_cast<std::size_t>(j)] && macs(i, j) >= trace)
         sets.union_set(i, first + j);
-  std::map<int, Cluster> clusters;
+  std::map<std::size_t, Cluster> clusters;
   for (int i = 0; i < first; ++i)
     if (free_from[static_cast<std::size_t>(i)]) clusters[sets.find_set(i)].from.push_back(i);
   for (int j = 0; j < second; ++j)
