@@ -232,13 +232,14 @@ def test_the_projection_finds_the_multiplier_of_arnoldi(squeal):
 
 @pytest.mark.parametrize("change", [[], ["friction.coefficient=0.48", "damping.beta=4e-7"]])
 def test_the_projection_finds_a_multiplier_that_its_reduced_model_lacks(squeal, tmp_path, change):
-    """1.1995 and 1.276 by the whole matrix, all complex. The reduced model of the recorded contact has none above
-    0.96. 1e-4: passes end when a multiplier changes by 2.5e-7, and the cycle's residual of 1e-5 is amplified."""
+    """1.185 and 1.27 by the whole matrix, all complex. The reduced model of the recorded contact has none above 0.96. The whole
+    matrix has means over eight points of each step, the projection one grid: its bar holds what that changes."""
     scene = [write_block_on_plate(tmp_path), "-cycle_free_periods", "0", "-settled_periods", "1"]
     scene += [word for key in change for word in ("--set", key)]
-    moduli = []
+    largest = []
     for method, options in (("whole", ["-cycle_multipliers", "1000000"]), ("oblique", [])):  # as many columns as the whole matrix has
         found = squeal(*scene, *options, ranks=1).report["cycle"]["multipliers"]
         assert found["method"] == method and found["stability"] == "unstable", found
-        moduli.append(abs(complex(found["values"][0]["real"], found["values"][0]["imaginary"])))
-    assert moduli[0] > 1.1 and abs(moduli[1] - moduli[0]) < 1e-4
+        largest.append(found["values"][0])
+    moduli = [abs(complex(one["real"], one["imaginary"])) for one in largest]
+    assert moduli[0] > 1.1 and abs(moduli[1] - moduli[0]) <= largest[1]["error"] < 0.02
