@@ -233,7 +233,7 @@ def test_the_projection_finds_the_multiplier_of_arnoldi(squeal):
 @pytest.mark.parametrize("change", [[], ["friction.coefficient=0.48", "damping.beta=4e-7"]])
 def test_the_projection_finds_a_multiplier_that_its_reduced_model_lacks(squeal, tmp_path, change):
     """1.185 and 1.27 by the whole matrix, all complex. The reduced model of the recorded contact has none above 0.96. The whole
-    matrix has means over eight points of each step, the projection one grid: its bar holds what that changes."""
+    matrix has means over eight points of each step, the projection one grid, which 4e-3 hold and its bar."""
     scene = [write_block_on_plate(tmp_path), "-cycle_free_periods", "0", "-settled_periods", "1"]
     scene += [word for key in change for word in ("--set", key)]
     largest = []
@@ -242,4 +242,4 @@ def test_the_projection_finds_a_multiplier_that_its_reduced_model_lacks(squeal, 
         assert found["method"] == method and found["stability"] == "unstable", found
         largest.append(found["values"][0])
     moduli = [abs(complex(one["real"], one["imaginary"])) for one in largest]
-    assert moduli[0] > 1.1 and abs(moduli[1] - moduli[0]) <= largest[1]["error"] < 0.02
+    assert moduli[0] > 1.1 and abs(moduli[1] - moduli[0]) < min(4e-3, largest[1]["error"])

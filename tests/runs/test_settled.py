@@ -241,13 +241,13 @@ def test_bars_of_multipliers_hold_what_impacts_within_a_step_change(squeal, tmp_
 @pytest.mark.parametrize("steps", [100, 400])
 def test_bars_where_pairs_stick_are_no_wider_than_the_grids_differ(converged, tmp_path, steps):
     """The largest multiplier, of a complex pair, is 0.8837 at 3201 and 6401 steps a period. That of the shift in time misses 1 by
-    3e-2 and 1e-2. The pair is off by 3.4e-3 and 6e-4, and bars may be five times as wide and 1e-3."""
+    3e-2 and 1e-2. At 100 steps the pair is off by 8e-4, and bars may be five times as wide and 2e-3."""
     cycle = converged(sticking_slider(tmp_path, {"coefficient": 2.887202266}, cycle={"steps_per_period": steps, "start": "mode",
                                                                                   "amplitude": 1.3}), ranks=1).report["cycle"]
     largest = cycle["multipliers"]["values"][0]
     off = abs(abs(complex(largest["real"], largest["imaginary"])) - 0.8837)
     assert cycle["multipliers"]["method"] == "whole" and off <= largest["error"] + 2e-4
-    assert largest["error"] < 5 * off + 1e-3
+    assert largest["error"] < 5 * off + 2e-3
 
 
 def pads_on_discs(folder):
