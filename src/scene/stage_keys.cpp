@@ -82,8 +82,10 @@ SceneKeys keys_of(CycleSettings& c)
       {"free_periods", &c.free_periods, "-", "periods integrated before the first Newton step", not_negative},
       {"starts", &c.starts, "-",
        "number of starts whose motions are listed: the unstable modes, their pairs, random sums of modes; beside a "
-       "stable equilibrium the mode that decays slowest, or that a given start has most of; 0: where several modes are "
-       "unstable and trajectories cost little these, their pairs and five random sums, at most 16; else none",
+       "stable equilibrium the mode that decays slowest, or that a given start has most of; 0, where trajectories cost "
+       "little: a small motion of the first unstable mode; where several grow these, their pairs and five random sums, "
+       "at "
+       "most 16; six beside stable sliding where friction falls with speed",
        not_negative},
       {"theta", &c.theta, "-", "parameter of the theta-method; 0.5 conserves energy", fraction},
       {"save_state", &c.save_state, "path", "state file of the cycle's start"},
