@@ -154,7 +154,7 @@ std::vector<Eigenpair> find_finer(std::span<const ComplexMode* const> modes, con
   return result;
 }
 
-/// Those that grow, then stable ones of least damping ratio: a finer mesh turns the sign of these first.
+/// The modes that grow, then stable ones of least damping ratio: a finer mesh turns the sign of these first.
 std::vector<const ComplexMode*> modes_at_stake(const Modes& found)
 {
   constexpr std::ptrdiff_t stable = 2;

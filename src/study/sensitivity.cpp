@@ -230,9 +230,9 @@ private:
     return result;
   }
 
-  /// By a difference of third order to one side, since many numbers are not negative. The number itself tells no step.
-  /// A first one, of its size, one unit or the largest thousandth of it that serves, shows the step that moves an
-  /// eigenvalue by 1e-6. The errors, its cube and rounding over it, are then both about 1e-9 and less.
+  /// Derivatives by a difference of third order to one side, since many numbers are not negative. The number itself
+  /// tells no step. A first one, of its size, one unit or the largest thousandth of it that serves, shows the step that
+  /// moves an eigenvalue by 1e-6. The errors, its cube and rounding over it, are then both about 1e-9 and less.
   std::vector<NumberDerivative> by_one_side(const SceneNumber& number)
   {
     constexpr double wanted = 1e-6, smaller = 1e-3, least = 1e-12, rounding = 1e-14;

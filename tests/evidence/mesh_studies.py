@@ -41,7 +41,7 @@ def exact_threshold():
 
 
 def table_of(n, divisions):
-    """Of each result its values on two meshes or one, and the limit with the bar."""
+    """Values of each result on two meshes or one, and the limit with the bar."""
     with tempfile.TemporaryDirectory() as place:
         mesh_cases.write_case(Path(place), "flutter pair", "hex8", n)
         scene = Path(place, "scene.toml")

@@ -141,11 +141,14 @@ def read_sections(deck):
                 owner.update(dict.fromkeys(free, sets.names[key]))
 
 
+MIDDLE_BY_WORD = {"SMID": 0.0, "SPOS": 0.5, "SNEG": -0.5}  # of the thickness
+
+
 def offset_of(block, deck):
     """The nodes' distance from the middle surface, in thicknesses."""
     word = block.options.get("OFFSET", "SMID").upper()
-    if word in ("SMID", "SPOS", "SNEG"):
-        return {"SMID": 0.0, "SPOS": 0.5, "SNEG": -0.5}[word]
+    if word in MIDDLE_BY_WORD:
+        return MIDDLE_BY_WORD[word]
     if re.match(r"[-+.\d]", word):
         return number(word, block.place)
     deck.note(f"OFFSET={word} of *SHELL SECTION, which varies", block.place)

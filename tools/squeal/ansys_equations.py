@@ -154,11 +154,14 @@ def section_data(words, place, deck):
         deck.thickness[deck.section] = deck.thickness.get(deck.section, 0.0) + values[0]
 
 
+MIDDLE_BY_WORD = {"TOP": -0.5, "BOT": 0.5, "MID": 0.0}  # of the thickness
+
+
 def section_offset(words, place, deck):
     """SECOFFSET,TOP, BOT or MID: where in a shell its nodes are."""
     word = words[1].upper()[:3] if len(words) > 1 else ""
-    if word in ("TOP", "BOT", "MID"):
-        deck.middles[deck.section] = {"TOP": -0.5, "BOT": 0.5, "MID": 0.0}[word]
+    if word in MIDDLE_BY_WORD:
+        deck.middles[deck.section] = MIDDLE_BY_WORD[word]
     elif not deck.is_pretension:
         deck.note(f"SECOFFSET,{','.join(words[1:])} of section {deck.section}", place)
 

@@ -42,7 +42,7 @@ def solid_energies(run: Results, shapes: np.ndarray) -> tuple[list[str], np.ndar
 
 @lru_cache(maxsize=8)
 def part_shares(run: Results, most: int) -> list[dict[str, Any]]:
-    """Of the first unstable modes whose shapes are there: number, frequency, growth, and shares by falling kinetic energy. Empty
+    """Number, frequency, growth and shares, by falling kinetic energy, of the first unstable modes whose shapes are there. Empty
     without solids, with parts of shells or orthotropic ones, or without shapes."""
     modes = run.report.get("modes", {}).get("modes", [])
     numbers = [number for number in run.mode_numbers() if number <= len(modes) and modes[number - 1]["unstable"]][:most] if modes else []

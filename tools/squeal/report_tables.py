@@ -120,7 +120,7 @@ def shares(mode):
 
 
 def driving_numbers(run):
-    """Those that are asked about first: friction, damping and moduli, where they are not 0."""
+    """The numbers that are asked about first: friction, damping and moduli, where they are not 0."""
     try:
         scene = scene_of(run)
     except Missing:

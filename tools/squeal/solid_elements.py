@@ -123,12 +123,12 @@ class Solid:
         return monomials(xi, linear) @ np.linalg.inv(monomials(self.corners, linear))
 
     def mode_values(self, xi: np.ndarray) -> np.ndarray:
-        """Of the incompatible modes: (point, mode)."""
+        """Values of the incompatible modes: (point, mode)."""
         x, y, z = xi.T
         return np.stack({3: [1 - x * x, 1 - y * y, 1 - z * z], 4: [x * x - x, y * y - y, x * y, 1 - z * z]}[self.modes], axis=-1)
 
     def mode_gradients(self, xi: np.ndarray) -> np.ndarray:
-        """Of the incompatible modes, less their values at the centre: (point, k, mode)."""
+        """Gradients of the incompatible modes, less their values at the centre: (point, k, mode)."""
         x, y, z = (xi - self.centre).T
         zero = np.zeros_like(x)
         if self.modes == 3:  # 1 - xi_k^2
@@ -215,7 +215,7 @@ class Elements:
 
     @cached_property
     def amplitudes(self) -> np.ndarray:
-        """Of the incompatible modes under unit displacements: they do no work with what they add."""
+        """Amplitudes of the incompatible modes under unit displacements: they do no work with what they add."""
         points, weights = self.kind.rule
         B, G = self.operators(points)
         w = weights * self._jacobians(points)[2]
