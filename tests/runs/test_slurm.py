@@ -8,6 +8,7 @@ import time
 import pytest
 import slurm as one_node
 from conftest import INPUTS, ROOT
+from cores import cores
 
 if not one_node.is_installed():
     pytest.skip("slurm-wlm is not installed: the jobs are not tested under Slurm", allow_module_level=True)
@@ -18,10 +19,11 @@ WRONG_KEY = ["--set", "friktion.coefficient=1"]
 
 @pytest.fixture(scope="module")
 def slurm(tmp_path_factory):
-    """More cores than there are: the short jobs run side by side."""
-    running = one_node.Slurm(tmp_path_factory.mktemp("slurm"), cores=24)
-    yield running
-    running.stop()
+    """More cores than there are: the short jobs run side by side, on the one that other tests leave them."""
+    with cores(1):
+        running = one_node.Slurm(tmp_path_factory.mktemp("slurm"), cores=24)
+        yield running
+        running.stop()
 
 
 def submit_to(slurm, folder, job, arguments=(), options=(), **knobs):
@@ -40,7 +42,7 @@ def submit(slurm, tmp_path):
 def limited(slurm, tmp_path_factory):
     """Folder and number of a job that would never end; Slurm looks at limits of time every half minute only."""
     folder = tmp_path_factory.mktemp("limited")
-    return folder, submit_to(slurm, folder, "long_run.sh", options=["--time=1"], PERIODS=100000)
+    return folder, submit_to(slurm, folder, "long_run.sh", options=["--time=1", "--ntasks=1"], PERIODS=100000)
 
 
 def printed(job):
