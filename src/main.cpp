@@ -240,8 +240,8 @@ void print_error(int rank, const std::exception& error)
   if (rank == 0) std::fprintf(stderr, "squeal: error: %.3000s\n", error.what());
 }
 
-/// Without a launcher Open MPI would start a daemon beside this process, for processes that it may start: a third of
-/// the time that a start takes. It would also make a folder inside one that all runs of a machine share and the last of
+/// Without a launcher Open MPI would start a daemon beside this process, for processes that it may start. That takes a
+/// third of a start's time. It would also make a folder inside one that all runs of a machine share and the last of
 /// them removes. About one start of a thousand fails by that. It takes settings of its own from the environment alone,
 /// before MPI is up.
 void stay_alone()

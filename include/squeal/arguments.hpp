@@ -46,8 +46,8 @@ std::string argument_reference();
 /// A table of Markdown with a row for each argument.
 std::string argument_page();
 
-/// Goes on as the tool that the first word names, a file of tools/ beside the program's folder or of its installation;
-/// returns where it names none. A scene of this name in the working folder comes first.
+/// Goes on as the tool that the first word names; returns where it names none. Tools are files of tools/ beside the
+/// program's folder or of its installation. A scene of this name in the working folder comes first.
 void become_tool(int argc, char** argv);
 
 /// The words for PETSc.

@@ -15,8 +15,8 @@ namespace squeal
 namespace
 {
 
-/// Working memory of an elimination [numbers]. It is allocated once, since the system takes as long to clear memory as
-/// some fronts take to fill, and is not touched before it is needed.
+/// Working memory of an elimination [numbers]. It is allocated once: the system takes as long to clear memory as some
+/// fronts take to fill. It is not touched before it is needed.
 struct WorkSizes
 {
   std::size_t waiting = 0;  // the stack of updates that wait for their parents: children come before these

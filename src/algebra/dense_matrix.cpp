@@ -127,8 +127,8 @@ template <class Complexes> lapack_complex_double* entries_of(Complexes& A)
   return reinterpret_cast<lapack_complex_double*>(A.data());
 }
 
-/// Vectors from LAPACK's columns for a real matrix: of conjugates the first one is the real part and the next one the
-/// imaginary part of the vector with Im(mu) > 0.
+/// Vectors from LAPACK's columns for a real matrix. Of conjugates the first one is the real part of the vector with
+/// Im(mu) > 0, the next one its imaginary part.
 MatrixXcd complex_columns(const VectorXcd& mu, const MatrixXd& packed)
 {
   MatrixXcd columns = packed.cast<Complex>();

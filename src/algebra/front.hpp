@@ -28,8 +28,8 @@ inline std::pair<int, int> place_of(const Triplets& lower, std::size_t k, const 
   return {std::max(p, q), std::min(p, q)};
 }
 
-/// The lower triangle of the frontal matrix of a supernode: columns for its pivots and inner rows, and the same rows
-/// followed by those of the border.
+/// The lower triangle of the frontal matrix of a supernode. It has columns for its pivots and inner rows, and the same
+/// rows followed by those of the border.
 struct Front
 {
   const Supernode& supernode;

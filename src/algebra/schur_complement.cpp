@@ -61,8 +61,8 @@ struct DenseRows
   std::vector<double> values{}; // and what is left of a larger use
 };
 
-/// Memory is used again from supernode to supernode and from strip to strip: the system would take as long to clear new
-/// one as the products take.
+/// Memory is used again from supernode to supernode and from strip to strip. The system would take as long to clear
+/// new one as the products take.
 void enlarge(std::vector<double>& values, std::size_t size)
 {
   if (values.size() < size) values.resize(size);

@@ -52,8 +52,8 @@ public:
   std::deque<std::pair<std::uint64_t, SymbolicFactor>> last{};
 };
 
-/// `lower`: the lower triangle of A and, from row dofs + 1 on, the border; read on rank 0, where the result is, and
-/// where a pattern that is known is found again. Entries in another order count as another pattern. Collective.
+/// `lower`: the lower triangle of A and, from row dofs + 1 on, the border; read on rank 0, where the result is. A
+/// pattern that is known is found again there. Entries in another order count as another pattern. Collective.
 SymbolicFactor analyse(const Triplets& lower, int dofs, int border, MPI_Comm comm, KnownAnalyses* known = nullptr);
 
 } // namespace squeal

@@ -184,7 +184,7 @@ double range_passed(const BranchCorrector& corrector, const BranchSide& side, bo
   return upwards ? start - corrector.settings.least + passed : passed;
 }
 
-/// The orbit round a corner. Where contact begins or ends to do something the branch may turn at once: what closes
+/// The orbit round a corner. Where contact begins or ends to do something the branch may turn at once. What closes
 /// beyond has its tangent by the contact there, and the parameter goes back.
 std::optional<BranchPoint> step_round_corner(BranchCorrector& corrector, const BranchPoint& from, Walk& walk)
 {

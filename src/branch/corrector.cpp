@@ -12,7 +12,7 @@ namespace
 constexpr int most_iterations = 12, most_secants = 120;
 constexpr double good_reduction = 0.3; // of the residual by a step: a worse one calls for a new Jacobian
 
-// The map of a period jumps where an event of contact meets the grid of time: an orbit there closes on neither side,
+// The map of a period jumps where an event of contact meets the grid of time. An orbit there closes on neither side,
 // and steps alternate between both. The same orbit begun a part of a step later has the event elsewhere.
 constexpr double progress = 0.9; // of the least residual so far
 constexpr int steps_without_progress = 4, most_moves = 3;

@@ -119,8 +119,8 @@ template <class Entry> Swept agree(const SweptProblem<Entry>& problem, bool move
   return swept;
 }
 
-/// The sweeps stop below the tolerance, or where rounding of dw, which is as large as the residual at first, or what
-/// the near field leaves out, hides the rest.
+/// The sweeps stop below the tolerance, or where rounding of dw or what the near field leaves out hides the rest. dw is
+/// as large as the residual at first.
 template <class Entry> void set_target(SweptProblem<Entry>& problem, const ContactSettings& settings)
 {
   const double digits = 32 * static_cast<double>(std::numeric_limits<Entry>::epsilon());

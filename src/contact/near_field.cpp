@@ -75,8 +75,8 @@ std::vector<float> limits_of(const Sizes& sizes)
   return limits;
 }
 
-/// All pairs from one end to the other, by the distance in neighbours from a pseudo-peripheral one (George and Liu
-/// 1979), which is as far as any from the first.
+/// All pairs from one end to the other, by the distance in neighbours from a pseudo-peripheral one. That is as far as
+/// any from the first (George and Liu 1979).
 std::vector<std::size_t> from_end_to_end(const Sizes& sizes)
 {
   const auto pairs = static_cast<std::size_t>(sizes.cols());

@@ -25,8 +25,8 @@ using Row = std::map<PetscInt, Coefficients>;
 // The rows that hold a column. A row loses none but its pivots' columns, which no row takes again.
 using Holders = std::map<PetscInt, std::vector<std::size_t>>;
 
-// A row that is eliminated: of a pair that slides its normal one, with friction in the other basis, of one that sticks
-// all of them, alike in both.
+// A row that is eliminated. Of a pair that slides it is the normal one, with friction in the other basis. Of one that
+// sticks it is each of them, alike in both.
 struct HeldRow
 {
   int pair;

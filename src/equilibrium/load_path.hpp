@@ -26,10 +26,10 @@ Held hold(const Structure& structure, const Interface& interface, const FactorOp
 /// bodies along their contacts, too. Error: a body that contact does not hold either (which one).
 Held hold_by_all_rows(const Structure& structure, const Interface& interface, const FactorOptions& options);
 
-// The search for an equilibrium on the rows of the pairs (src/README.md, sections 2.2 to 2.9). Of structures whose
-// pairs are all driven the unknowns are normal rows alone: friction is part of the compliance,
-//     M = D_nn + mu D_nt e,
-// and one increment is exact. Others are walked along their load path.
+// The search for an equilibrium on the rows of the pairs (src/README.md, sections 2.2 to 2.9). Where all pairs are
+// driven the unknowns are normal rows alone, and one increment is exact. Friction is part of the compliance then,
+//     M = D_nn + mu D_nt e.
+// Other structures are walked along their load path.
 
 /// Operators that models of one K and one B share: neither loads, friction nor the drive change it.
 struct PathOperators

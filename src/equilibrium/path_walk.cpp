@@ -136,8 +136,8 @@ std::string end_of(const PathProblem& problem, const PathWalk& walk, Advance las
   return format(text, walk.part, problem.ends[walk.step].name.c_str());
 }
 
-/// Walks the whole path with each stretch in so many parts. A part is halved where it has no solution, and where rows
-/// move as far as in the walk `before`: a shorter increment must move them less.
+/// Walks the whole path with each stretch in so many parts. A part is halved where it has no solution. It is halved,
+/// too, where rows move as far as in the walk `before`: a shorter increment must move them less.
 PathWalk walk_in_parts(const PathProblem& problem, int parts, const PathWalk& before)
 {
   const double most = before.completed ? std::max(0.75 * before.largest_move, least_move(before.q))

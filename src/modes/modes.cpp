@@ -97,9 +97,9 @@ void search_whole(const PairProblem& problem, double floor, PairSearch& search)
   if (problem.K_loss) search.solution = solve_whole(problem.sliding, problem.K_loss, window);
 }
 
-/// All pairs slice by slice of |lambda|, of equal width, each from the undamped problem with friction about its middle:
-/// unsymmetric, so that its spaces and its factor know friction. A space holds all theta that friction turns by the
-/// usual angle.
+/// All pairs slice by slice of |lambda|, of equal width, each from the undamped problem with friction about its middle.
+/// That is unsymmetric, so that its spaces and its factor know friction. A space holds all theta that friction turns by
+/// the usual angle.
 void search_slices(const PairProblem& problem, double floor, const PencilOptions& options, PairSearch& search)
 {
   constexpr int in_slice = 75;                // pairs

@@ -19,7 +19,7 @@ using Eigen::MatrixXd;
 using Pairs = std::span<const DenseEigenpair>;
 
 constexpr std::size_t at_once = 64; // pairs expanded at a time
-// Columns of V, over those that a restart keeps. Pairs that friction turns far take eight passes and more, whose dense
+// Columns of V, over those that a restart keeps. Pairs that friction turns far take eight passes and more. Their dense
 // problems would take most of the time; with half as many columns twice as many passes follow.
 constexpr Index most_of_kept = 2;
 
@@ -183,7 +183,7 @@ std::vector<Eigenpair> pairs_of(const Subspace& space, Pairs pairs)
 }
 
 /// An orthonormal basis of the residuals' directions, down to `share` of the largest. No column counts for more than
-/// 30 times the median: a combination of corrections that is no pair but is in the window would outweigh all others.
+/// 30 times the median. A combination of corrections that is in the window, but no pair, would outweigh all others.
 MultiVector largest_directions(MultiVector residuals, double share)
 {
   constexpr double outstanding = 30;

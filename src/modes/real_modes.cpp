@@ -107,7 +107,7 @@ void keep_first(RealModes& modes, std::ptrdiff_t count)
   modes.shapes.erase(modes.shapes.begin() + count, modes.shapes.end());
 }
 
-/// The modes with theta < limit, in slices of equal width in frequency with about `slice` modes each: the work of a
+/// The modes with theta < limit, in slices of equal width in frequency with about `slice` modes each. The work of a
 /// slice grows by the square of their number. A mode on an edge may be missed or found twice, which the count shows:
 /// then other edges follow.
 RealModes search_below(Mat M, Mat K, double limit, const PencilOptions& options)

@@ -72,8 +72,8 @@ struct PointModes
 /// The backward error of vectors that are exact.
 inline constexpr double exact_tolerance = 1e-10;
 
-/// Backward errors that studies ask for at most. The error of an eigenvalue is the product of those of both vectors,
-/// magnified by its nearness to others and by the size of the matrices beside that on the modes.
+/// Backward errors that studies ask for at most. The error of an eigenvalue is the product of those of both vectors.
+/// Its nearness to others magnifies it, and the size of the matrices beside that on the modes.
 inline constexpr double close_tolerance = 1e-8;
 
 /// Error: a closed pair that friction jams. The closed pairs include those of the basis.
@@ -131,8 +131,8 @@ ModeForms forms_between(const PointModes& from, const PointModes& to);
 /// is like none. Not collective.
 std::vector<int> names_by_shapes(const PointModes& reference, const PointModes& point);
 
-/// For each mode of the first point its match at the second one, by the MAC of right with left vectors, which is at
-/// least `clear`. Not collective.
+/// For each mode of the first point its match at the second one. The MAC of its right with the match's left vector is
+/// at least `clear`. Not collective.
 std::vector<Match> follow(const ModeForms& forms, double clear);
 
 /// The functions of a search between two points.

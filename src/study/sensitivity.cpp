@@ -152,8 +152,8 @@ public:
     equilibria_.expect(problem.sliding.equilibrium.closed);
   }
 
-  /// By a central difference. Where that moves an eigenvalue by so little that it drowns in rounding, as by a loss
-  /// factor of 1e-6, by one of fourth order over a longer step.
+  /// By a central difference, or by one of fourth order over a longer step. The longer one is taken where an eigenvalue
+  /// moves by so little that it drowns in rounding, as by a loss factor of 1e-6.
   std::vector<NumberDerivative> by(const SceneNumber& number)
   {
     constexpr double short_step = 1e-4; // most numbers enter M, C and K linearly

@@ -105,8 +105,8 @@ private:
     }
   }
 
-  /// The modes at a point; nothing if it fails, which is recorded: a point between others once, though a step may be
-  /// divided there for several reasons.
+  /// The modes at a point; nothing if it fails, which is recorded. A point between others is recorded once, though a
+  /// step may be divided there for several reasons.
   std::optional<Followed> evaluate(Followed point)
   {
     if (find_modes_of(point)) return point;
@@ -230,8 +230,8 @@ private:
     return evaluate(between_points(of_line, value));
   }
 
-  /// Whether a mode in the band may change its stability on the way: at one end its growth rate is no farther from zero
-  /// than both are from each other. Any other would need a way of three times that length.
+  /// Whether a mode in the band may change its stability on the way. At one end its growth rate is then no farther from
+  /// zero than both are from each other. Any other would need a way of three times that length.
   bool may_change_stability(const Followed& before, const Followed& now, const std::vector<Match>& matches) const
   {
     const std::vector<TwoSidedPair>&from = before.modes.pairs, &to = now.modes.pairs;
@@ -298,8 +298,8 @@ private:
     return true;
   }
 
-  /// Seeks the thresholds on the way. The modes found meanwhile are nearer to each other than those of both ends, so
-  /// that tracks go by them; where one of those is unclear, by both ends.
+  /// Seeks the thresholds on the way. The modes found meanwhile are nearer to each other than those of both ends, and
+  /// tracks go by them. Where one of those is unclear they go by both ends.
   void take_tracks(const Followed& before, Followed& now, const std::vector<Match>& matches, double tolerance)
   {
     const auto point_at = [&](double value) { return evaluate(between_points(now, value)); };

@@ -40,8 +40,8 @@ public:
   /// The number of pairs that are closed at one of two points alone; 0 where they have other pairs.
   int changed_pairs(const SweptPlace& a, const SweptPlace& b);
 
-  /// The first change of contact between two points of a line, to `tolerance` of the first number: of a pair that is
-  /// closed at one of them alone. Nothing: there is none.
+  /// The first change of contact between two points of a line, to `tolerance` of the first number. It is of a pair that
+  /// is closed at one of them alone. Nothing: there is none.
   std::optional<ContactChange> contact_change(const SweptPlace& from, const SweptPlace& to, double tolerance);
 
   /// At the point visited last; null: at none.

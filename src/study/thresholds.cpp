@@ -107,8 +107,8 @@ private:
   }
 
   /// Points that enclose a threshold to the tolerance, in the order of the way, or the middle between equal numbers of
-  /// unstable modes. The growth rates of the band are continuous in falling order, whether or not the modes can be
-  /// distinguished: the first one past the smaller number changes its sign.
+  /// unstable modes. In falling order the growth rates of the band are continuous, whether or not modes can be
+  /// distinguished. The first one past the smaller number changes its sign.
   std::vector<Followed> points_between(const Followed& a, const Followed& b)
   {
     const std::size_t before = unstable(a).size(), after = unstable(b).size(), rank = std::min(before, after);
@@ -133,9 +133,9 @@ private:
     return points;
   }
 
-  /// Records the thresholds of a step that is not divided any further: as many as there are more or fewer unstable
-  /// modes, of the least growth. Modes that only seem to change places are none. A track that is lost or new gets a
-  /// number.
+  /// Records the thresholds of a step that is not divided any further. They are as many as there are more or fewer
+  /// unstable modes, of the least growth. Modes that only seem to change places are none. A track that is lost or new
+  /// gets a number.
   void record(const Followed& a, Followed& b, Changes& changes)
   {
     const bool gains = changes.gained.size() > changes.lost.size();

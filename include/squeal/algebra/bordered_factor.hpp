@@ -3,8 +3,8 @@
 ///     [A  B'] [x     ]   [b]
 ///     [B  0 ] [lambda] = [*]     leaves the Schur complement -B A^-1 B' of the border.
 /// B is never eliminated. A solve has two halves: `forward` turns b into B A^-1 b, and `backward` gives x = A^-1 (b -
-/// B' lambda) for the caller's lambda. Both together cost less than two solves with A alone, but for MUMPS's factor,
-/// which solves twice, and once for each column of the Schur complement. Several right-hand sides are solved at once.
+/// B' lambda) for the caller's lambda. Both together cost less than two solves with A alone. MUMPS's factor solves
+/// twice, and once for each column of the Schur complement. Several right-hand sides are solved at once.
 #include "squeal/base/petsc.hpp"
 #include "squeal/base/words.hpp"
 

@@ -96,8 +96,8 @@ template <class Matrix> std::vector<DenseEigenpair> solve_dense_quadratic_shared
 /// All eigenpairs of A, the largest modulus first, of a complex pair first the one with Im(lambda) > 0.
 std::vector<DenseEigenpair> solve_dense_unsymmetric(const Eigen::MatrixXd& A);
 
-/// Real columns that span the pairs' vectors, which have `size` entries, one column a pair: the real part where
-/// Im(lambda) >= 0, the imaginary part of the other one.
+/// Real columns that span the pairs' vectors, which have `size` entries. There is one column a pair: the real part
+/// where Im(lambda) >= 0, the imaginary part of the other one.
 Eigen::MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Eigen::Index size);
 
 std::vector<std::complex<double>> values_of(const std::vector<DenseEigenpair>& pairs);

@@ -1,6 +1,6 @@
 #pragma once
-/// Requests that reach a run from outside while it computes: to end in order, by a signal or the time limit, and to
-/// make a checkpoint. One process is one run, as for signals: its control is the process's own.
+/// Requests that reach a run from outside while it computes. By a signal or the time limit it ends in order, or makes a
+/// checkpoint. One process is one run, as for signals: its control is the process's own.
 #include "squeal/base/finally.hpp"
 
 #include <mpi.h>
@@ -25,8 +25,8 @@ struct RunLimits
 /// The rank that mpirun or srun gave this process; empty if neither started it. Known before MPI is up.
 const std::string& launched_rank();
 
-/// From here on a rank whose launcher dies ends with it: mpirun's or srun's ranks have no business without it, and a
-/// run of one process outlives its shell.
+/// From here on a rank whose launcher dies ends with it: mpirun's or srun's ranks have no business without it. A run
+/// of one process outlives its shell.
 void end_with_launcher();
 
 /// From here on SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2 and SIGXCPU are requests to end. They stay so to the end of

@@ -1,6 +1,6 @@
 #pragma once
 /// The condensed operator W of the contact solvers, symmetric, over the rows of all pairs (src/README.md, section 4.4).
-/// How it is stored is known to this type alone: solvers use its products, the blocks of its diagonal, and its rows
+/// How it is stored is known to this type alone. Solvers use its products, the blocks of its diagonal, and its rows
 /// added up pair by pair.
 ///
 /// Ranks share a large W: each has some columns of its lower triangle, and sweeps over some of the pairs. They solve

@@ -62,8 +62,8 @@ class StatusSystem
 public:
   StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at);
 
-  /// Factors of the same operator serve, and are made anew where the laws of many pairs differ from theirs by more than
-  /// `near`, a change of J. Pairs that differ by less keep the law of the factors.
+  /// Factors of the same operator serve. They are made anew where the laws of many pairs differ from theirs by more
+  /// than `near`, a change of J. Pairs that differ by less keep the law of the factors.
   StatusSystem(const StickSlipOperator& of, const StickSlipFriction& friction, const StickSlipState& at,
                const Softening& soft, double near, std::shared_ptr<const StatusFactors>& factors);
 

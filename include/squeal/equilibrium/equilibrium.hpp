@@ -3,8 +3,8 @@
 ///     K u0 = F + B_n' r_n + B_t' r_t,   0 <= g _|_ r_n >= 0,   r_t = mu r_n e,   e = v_d/|v_d|.
 /// Newton's method on the statuses of the pairs by the condensed compliance D = B K^-1 B'; the natural map checks it.
 ///
-/// Where contact alone holds a body, K is singular. Springs across every pair are then added and their force is taken
-/// off again (section 2.3), as where springs are so soft that rounding would spoil the reactions.
+/// Where contact alone holds a body, K is singular. Springs across every pair are then added, and their force is taken
+/// off again (section 2.3). So it is where springs are so soft that rounding would spoil the reactions.
 ///
 /// Caveat: at large mu an equilibrium may not exist, or not be the only one. It is the only one if the symmetric part
 /// of D_nn + mu D_nt e is positive definite. That is checked where K alone is regular. Its stability is found by the

@@ -1,6 +1,6 @@
 #pragma once
-/// The way along a load path on the rows of the pairs, increment by increment (src/README.md, section 2.9): statuses,
-/// locked-in friction, and where it ends if there is no equilibrium beyond. Arithmetic of one rank.
+/// The way along a load path on the rows of the pairs, increment by increment (src/README.md, section 2.9). It has
+/// statuses, locked-in friction, and its end where no equilibrium is beyond. Arithmetic of one rank.
 #include "squeal/contact/stick_slip.hpp"
 
 #include <optional>
@@ -52,8 +52,8 @@ struct PathWalk
 /// proportion from closed gaps takes one: the problem has no scale.
 PathWalk walk_path(const PathProblem& problem);
 
-/// The state under the whole load with its pairs stuck where they are: one increment from reactions r and slips w that
-/// are minus the offsets of undriven pairs.
+/// The state under the whole load with its pairs stuck where they are. It is one increment from reactions r and slips
+/// w that are minus the offsets of undriven pairs.
 PathWalk hold_at(const PathProblem& problem, const StickSlipState& from);
 
 /// The state under the whole load of driven pairs alone, whose friction is in M: one increment, from those pairs closed
@@ -67,8 +67,8 @@ bool has_no_solution(const StickSlipOperator& of, const Eigen::VectorXd& q);
 /// Whether one solution is sure: N is 1, and the symmetric part of M is positive definite.
 bool has_one_solution(const StickSlipOperator& of);
 
-/// The motion of the rows that the load drives and no forces of closed pairs within their friction resist, where there
-/// is one: no equilibrium exists then, whatever the path. `q`: by the load alone.
+/// The motion of the rows that the load drives and no forces of closed pairs within their friction resist. Where there
+/// is one, no equilibrium exists, whatever the path. `q`: by the load alone.
 std::optional<Eigen::VectorXd> unresisted_motion(const PathProblem& problem, const StickSlipFriction& friction,
                                                  const Eigen::VectorXd& q);
 

@@ -41,8 +41,8 @@ class ResultsFolder
 {
 public:
   /// Makes and locks the folder; what a run that was killed left there is moved if it is whole, else removed.
-  /// Collective. Error: the folder cannot be written, another run is at work in it, or it holds a folder of a result's
-  /// name that no run has made.
+  /// Collective. Error: the folder cannot be written, or another run is at work in it. Error: it holds a folder of a
+  /// result's name that no run has made.
   ResultsFolder(const std::filesystem::path& place, MPI_Comm comm);
 
   /// Without publish, leaves everything as it was before, but for checkpoints and what keep_finished keeps.

@@ -131,8 +131,8 @@ struct Spring
   double damping = 0;      // [N s/m]
 };
 
-/// A joint of two bodies, or of one with the ground. The motion of `to` relative to `from`, both rigid bodies taken to
-/// one place, is locked as in a joint, or has stiffness as in a bushing.
+/// A joint of two bodies, or of one with the ground; both rigid bodies are taken to one place. The motion of `to`
+/// relative to `from` is locked as in a joint, or has stiffness as in a bushing.
 struct Connector
 {
   std::string from;                // point, rigid body or coupling

@@ -15,7 +15,7 @@ namespace squeal
 {
 
 /// outcome: "converged", "not converged" (a residual stays above the tolerance), "skipped", "off".
-/// residual: the largest geometric mean of |Q q_i - Y'p_i| and of that of the transposed problem, for unit forces [-].
+/// residual: the largest geometric mean of |Q q_i - Y'p_i| and its like of the transposed problem, for unit forces.
 struct Response
 {
   Outcome outcome;
