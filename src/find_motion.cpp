@@ -301,7 +301,7 @@ void seek_from_settled(MotionSearch& search, const char* name)
 }
 
 /// The ways, in their order. Each decides whether it has the answer:
-/// - a cycle: its verdict is that of `judge` (shooting/orbit.cpp), by its multipliers and motions beside it. One that
+/// - a cycle: its verdict is that of `judge` (shooting/verdict.cpp), by its multipliers and motions beside it. One that
 ///   attracts has converged; one that repels is an unstable cycle, and the search goes on from its free motion;
 /// - a settled motion: its kind is that of `judge_motion` (settled/motion.cpp), by exponents, spectrum and energies.
 constexpr std::array ways = {

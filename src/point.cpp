@@ -138,7 +138,7 @@ SlidingPoint with_small_motions(SlidingPoint point, const Scene& scene, const Pr
                           [&]
                           {
                             if (point.equilibrium.outcome.kind == OutcomeKind::converged)
-                              point.linearised = linearise(point.sliding()); // friction enters C and K
+                              point.linearised = linearise(point.sliding()); // friction enters Y and C
                             return modes_at(point, scene, options.modes);
                           });
   if (const std::string off = why_off(Stage::estimate, point, scene); !off.empty())

@@ -14,8 +14,6 @@
 namespace squeal
 {
 
-using Eigen::MatrixXd;
-
 MatrixXd dense_copy(Mat A)
 {
   const PetscInt rows = row_count(A), columns = column_count(A);
@@ -102,12 +100,8 @@ MatrixXd orthonormal_columns(const MatrixXd& A)
 namespace
 {
 
-using Complex = std::complex<double>;
-using Eigen::Index;
 using Eigen::MatrixXcd;
-using Eigen::MatrixXd;
 using Eigen::VectorXcd;
-using Eigen::VectorXd;
 
 enum class Vectors
 {

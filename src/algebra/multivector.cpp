@@ -14,10 +14,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 /// A sum over all ranks may differ in the last bit from rank to rank: rank 0 adds up.
 void add_up(MatrixXd& parts, MPI_Comm comm)
 {

@@ -15,9 +15,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-
 constexpr PetscInt block_size = 12;     // vectors in the starting block
 constexpr PetscInt largest_space = 600; // vectors
 

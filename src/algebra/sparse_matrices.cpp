@@ -1,5 +1,6 @@
 #include "squeal/algebra/sparse_matrices.hpp"
 #include "squeal/algebra/panel.hpp"
+#include "squeal/base/dense.hpp"
 
 #include <algorithm>
 #include <petscsf.h>
@@ -122,9 +123,6 @@ void multiply_both(const PairedMatrices& matrices, const std::array<Vec, 2>& of,
 
 namespace
 {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
 
 constexpr int lanes = 16; // columns at once
 

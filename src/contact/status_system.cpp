@@ -8,11 +8,8 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
 using Eigen::Matrix3d;
-using Eigen::MatrixXd;
 using Eigen::Vector3d;
-using Eigen::VectorXd;
 
 /// The smallest pivot over the largest.
 double pivot_ratio(const Eigen::PartialPivLU<MatrixXd>& factors)

@@ -11,8 +11,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::VectorXd;
-
 constexpr double tight = 1e-12, good = 1e-9; // of the residual: where iterations end, and what counts as solved
 
 /// |N w - q - M r| over the part of load and reactions in it. Motions are no measure: bodies that nothing holds go far.

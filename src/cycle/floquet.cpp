@@ -17,11 +17,6 @@ namespace squeal
 namespace
 {
 
-using Complex = std::complex<double>;
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 // parts of a change on other steps that are taken for the error
 constexpr double of_order_2 = 4. / 3, of_order_1 = 2;
 

@@ -14,9 +14,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 /// (q, v) in one vector.
 VectorXd stacked(const ReducedState& state)
 {
@@ -98,10 +95,6 @@ Preconditioner preconditioner_of(const MonodromyCorrection& correction, const Re
 
 namespace
 {
-
-using Complex = std::complex<double>;
-using Eigen::Index;
-using Eigen::MatrixXd;
 
 /// Which multipliers are wanted.
 struct LargeValues

@@ -60,9 +60,6 @@ Equilibrium find_equilibrium(const Structure& structure, const Interface& interf
 namespace
 {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 /// The way to the end of a step of the path, with bolts of given shortenings there. These are the ones that it
 /// tightens, and those of later steps, which carry nothing yet.
 class StepOfBolts

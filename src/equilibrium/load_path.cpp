@@ -13,10 +13,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 VectorXd as_vector(const std::vector<double>& values)
 {
   return VectorXd::Map(values.data(), static_cast<Index>(values.size()));

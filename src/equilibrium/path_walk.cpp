@@ -16,9 +16,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 constexpr double least_part = 0x1p-20; // of a step: where a limit is known to
 constexpr int first_parts = 8;         // of a stretch: coarser ones lose the statuses
 

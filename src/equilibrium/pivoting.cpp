@@ -17,10 +17,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 /// The solution of a set of closed pairs, the shortest one where they share a rigid face. It is nothing where a sign is
 /// wrong or the pairs do not balance.
 std::optional<StickSlipState> solution_of(const StickSlipOperator& of, const VectorXd& q,

@@ -206,8 +206,6 @@ ModeCount count_pairs(const PairSearch& search, double floor, double least)
 namespace
 {
 
-using Complex = std::complex<double>;
-
 /// The entry of phi with the largest modulus. Of nearly equal ones it is the first, for any number of ranks.
 std::complex<double> largest_component(Vec real, Vec imaginary)
 {

@@ -14,8 +14,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
 using Pairs = std::span<const DenseEigenpair>;
 
 constexpr std::size_t at_once = 64; // pairs expanded at a time
@@ -251,8 +249,6 @@ MultiVector span_of(std::span<const Eigenpair> pairs, Mat layout)
 
 namespace
 {
-
-using Complex = std::complex<double>;
 
 constexpr double two_sided_tolerance = 1e-13; // backward error: derivatives are off by it to first order
 constexpr int two_sided_passes = 60;          // each adds two vectors to a side, with which small problems stay small

@@ -201,7 +201,6 @@ double backward_error(const QuadraticProblem& problem, const QuadraticNorms& nor
   return residual / (scale * size);
 }
 
-using Complex = std::complex<double>;
 using Eigen::MatrixXcd;
 
 Complex loss_factor_of(Complex lambda)

@@ -15,8 +15,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-
 double trace(Mat A)
 {
   double result = 0;

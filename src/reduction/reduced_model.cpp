@@ -82,10 +82,6 @@ std::vector<int> pairs_that_may_slip(const SlidingEquilibrium& sliding, const Li
 namespace
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 Eigen::SparseMatrix<double> identity_of_rows(Mat A)
 {
   Eigen::SparseMatrix<double> result(row_count(A), row_count(A));

@@ -17,9 +17,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 struct Iterate
 {
   const ReducedMap& map;
@@ -114,9 +111,6 @@ bool solve_contact(const ReducedMap& map, const VectorXd& b, ReducedContact& con
 }
 
 // The modified theta-method on the reduced model: the scheme of transient/theta_step.hpp, in few dense products.
-
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 namespace
 {

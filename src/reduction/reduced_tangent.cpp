@@ -18,9 +18,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-
 /// The contact of one step, linearised.
 struct LinearStep
 {

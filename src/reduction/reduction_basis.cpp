@@ -17,10 +17,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 /// A column of the modes.
 struct ModeShape
 {

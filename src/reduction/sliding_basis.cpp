@@ -13,9 +13,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-
 /// The local rows of the degrees of freedom at which some row of B has an entry, ascending.
 std::vector<Index> dofs_with_entries(Mat B)
 {

@@ -1,4 +1,5 @@
 #include "squeal/report/report.hpp"
+#include "squeal/scene/numbers.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -227,15 +228,24 @@ std::string linear_text(const Report& report)
   return format("the equilibrium is unstable at %.5g Hz", mode.frequency_hz());
 }
 
+/// Key and coefficient of the first driven contact's friction.
+std::pair<std::string, double> driven_friction(const Scene& scene)
+{
+  const auto driven = std::ranges::find_if_not(scene.contacts, [](const Contact& c) { return is_undriven(c); });
+  if (driven == scene.contacts.end() || !driven->friction)
+    return {friction_coefficient_key, scene.friction.coefficient};
+  return {format("contact.%td.friction", driven - scene.contacts.begin()), driven->friction->coefficient};
+}
+
 /// Options that lead on from what was found; empty: it is complete, and the report page shows it.
 std::string options_to_go_on(const Report& report, const Scene& scene)
 {
   const OutcomeKind equilibrium = report.point.equilibrium.outcome.kind, cycle = report.motion.cycle.outcome.kind;
   const Modes& modes = report.point.modes;
+  const auto [friction, coefficient] = driven_friction(scene);
   const bool has_motion = cycle == OutcomeKind::converged || has_run(report.motion.settled.outcome);
   const bool has_study = scene.sweep || scene.sensitivity || scene.robustness || scene.response || scene.branch;
-  if (equilibrium != OutcomeKind::converged)
-    return format(" --set friction.coefficient=%g", scene.friction.coefficient / 2);
+  if (equilibrium != OutcomeKind::converged) return format(" --set %s=%g", friction.c_str(), coefficient / 2);
   if (has_run(modes.outcome) && !without_friction(report).empty()) return {};
   if (modes.outcome.kind == OutcomeKind::not_converged) return " --set modes.method=toar";
   if (cycle == OutcomeKind::converged && report.motion.cycle.multipliers.stability == Stability::undecided)
@@ -244,9 +254,9 @@ std::string options_to_go_on(const Report& report, const Scene& scene)
   if (has_run(report.motion.cycle.outcome) && modes.unstable_count > 0)
     return " --set transient.periods=400 --set cycle.start=transient";
   if (modes.unstable_count > 0 && modes.modes.front().frequency_hz() > 0) return " --set cycle.enabled=true";
-  if (modes.unstable_count > 0 || scene.friction.coefficient == 0) return {};
-  return format(" --set sweep.key=friction.coefficient --set sweep.from=%g --set sweep.to=%g --set cycle.enabled=false",
-                scene.friction.coefficient, 2 * scene.friction.coefficient);
+  if (modes.unstable_count > 0 || coefficient == 0) return {};
+  return format(" --set sweep.key=%s --set sweep.from=%g --set sweep.to=%g --set cycle.enabled=false", friction.c_str(),
+                coefficient, 2 * coefficient);
 }
 
 } // namespace

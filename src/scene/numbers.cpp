@@ -65,6 +65,9 @@ double number_at(const Scene& scene, const std::string& key, const std::string& 
   if (!found.is_there)
     throw refusal(std::string("is not in the scene: name a number as --set does, such as ") + friction_coefficient_key);
   if (!found.number) throw refusal("is not a number; of a list name an entry, such as force.0.vector.2");
+  const auto has_own = [](const Contact& contact) { return contact.friction.has_value(); };
+  if (first == "friction" && !scene.contacts.empty() && std::ranges::all_of(scene.contacts, has_own))
+    throw refusal("changes nothing, since each contact has friction of its own: name that, as contact.0.friction");
   return *found.number;
 }
 

@@ -144,7 +144,8 @@ std::string rule_text(const SceneKey& key)
 {
   Words words;
   if (const auto* choice = std::get_if<Choice>(&key.target)) words = choice->words;
-  if (const auto* start = std::get_if<StartTarget>(&key.target)) words = start->kind.words;
+  if (const auto* start = std::get_if<StartTarget>(&key.target)) // the last word stands for a file
+    words = start->kind.words.first(start->kind.words.size() - 1);
   std::string text = bounds_of(key.rule).page;
   for (const char* one : words) text += (text.empty() ? "" : ", ") + markdown_code(one);
   return text;

@@ -89,8 +89,6 @@ void decide(Multipliers& multipliers, const Completeness& coverage)
   }
 }
 
-using Eigen::MatrixXd;
-
 StateBlock block_of(std::span<const Owned<Vec>> states)
 {
   std::vector<Vec> u, v;
@@ -233,9 +231,6 @@ StateBlock image_of(const Monodromy& monodromy, const StateBlock& X)
 
 namespace
 {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
 
 constexpr Index of_block = 6; // columns
 // Few powers of few motions may be bounded where another one grows: the residual of a Ritz value says nothing of what

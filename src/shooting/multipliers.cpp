@@ -16,9 +16,6 @@ namespace squeal
 namespace
 {
 
-using Complex = std::complex<double>;
-using Eigen::Index;
-
 constexpr double decays = 0.7; // a period: such a motion decides nothing
 
 /// The multipliers, with those of slow motions and of the shift in time along eight periods on a grid of 8 N + 1 steps,

@@ -19,10 +19,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Complex = std::complex<double>;
-
 constexpr double largest_condition = 1e6; // of W'V: beyond, an error of 1e-10 in Z is one of 1e-4 in mu
 // A pass leaves some 0.6 of the error. Where periods are dear and the bar holds more, 8 are enough.
 constexpr int most_passes = 24, most_dear_passes = 8;

@@ -17,8 +17,8 @@ namespace squeal
 namespace
 {
 
-/// Index in a file: PETSc writes PetscInt, so that builds with 32- and 64-bit indices have different files.
-using Index = std::conditional_t<sizeof(PetscInt) == 8, std::int64_t, std::int32_t>;
+/// An index in a file: PETSc writes PetscInt, so that builds with 32- and 64-bit indices have different files.
+using FileIndex = std::conditional_t<sizeof(PetscInt) == 8, std::int64_t, std::int32_t>;
 
 template <class Number> std::vector<Number> read_big_endian(std::istream& stream, std::int64_t count)
 {
@@ -48,14 +48,14 @@ std::ifstream open_file(const std::filesystem::path& file)
 }
 
 /// Returns the first `count` indices after the class id. Throws Error if the file is of another kind or truncated.
-std::vector<Index> read_header(std::istream& stream, const std::filesystem::path& file, Index class_id,
-                               const std::string& kind, std::int64_t count)
+std::vector<FileIndex> read_header(std::istream& stream, const std::filesystem::path& file, FileIndex class_id,
+                                   const std::string& kind, std::int64_t count)
 {
-  const auto id = read_big_endian<Index>(stream, 1);
+  const auto id = read_big_endian<FileIndex>(stream, 1);
   if (!stream || id[0] != class_id)
     throw Error(file.string() + ": not a " + kind + " in PETSc's binary format with " +
-                std::to_string(8 * sizeof(Index)) + "-bit indices; tools/matrices writes one");
-  auto header = read_big_endian<Index>(stream, count);
+                std::to_string(8 * sizeof(FileIndex)) + "-bit indices; tools/matrices writes one");
+  auto header = read_big_endian<FileIndex>(stream, count);
   if (!stream) throw Error(file.string() + ": truncated within its header");
   return header;
 }
@@ -70,14 +70,14 @@ void check_length(const std::filesystem::path& file, std::int64_t expected)
 }
 
 /// Throws Error if the columns of a row do not ascend or are out of range.
-void check_columns(std::istream& stream, const std::filesystem::path& file, const std::vector<Index>& counts,
-                   Index columns)
+void check_columns(std::istream& stream, const std::filesystem::path& file, const std::vector<FileIndex>& counts,
+                   FileIndex columns)
 {
   for (std::size_t row = 0; row < counts.size(); ++row)
   {
-    const auto column = read_big_endian<Index>(stream, counts[row]);
-    Index previous = -1;
-    for (const Index j : column)
+    const auto column = read_big_endian<FileIndex>(stream, counts[row]);
+    FileIndex previous = -1;
+    for (const FileIndex j : column)
     {
       if (j <= previous || j >= columns)
         throw Error(file.string() + ": row " + std::to_string(row) + " has column " + std::to_string(j) + " after " +
@@ -97,11 +97,11 @@ MatrixSize checked_size(const std::filesystem::path& file)
   if (entries < 0) throw Error(file.string() + ": a dense matrix; write it as a sparse one (AIJ)");
   if (rows < 1 || columns < 1)
     throw Error(file.string() + ": a matrix of " + std::to_string(rows) + " x " + std::to_string(columns));
-  const std::int64_t width = sizeof(Index);
+  const std::int64_t width = sizeof(FileIndex);
   check_length(file, (4 + rows + entries) * width + entries * 8);
-  const auto counts = read_big_endian<Index>(stream, rows);
+  const auto counts = read_big_endian<FileIndex>(stream, rows);
   std::int64_t sum = 0;
-  for (const Index count : counts)
+  for (const FileIndex count : counts)
   {
     if (count < 0 || count > columns) throw Error(file.string() + ": a row of " + std::to_string(count) + " entries");
     sum += count;
@@ -208,8 +208,8 @@ std::vector<std::vector<double>> read_vectors(const std::filesystem::path& file)
 
 void append_vector(const std::vector<double>& entries, std::string& bytes)
 {
-  append_big_endian(static_cast<Index>(VEC_FILE_CLASSID), bytes);
-  append_big_endian(static_cast<Index>(entries.size()), bytes);
+  append_big_endian(static_cast<FileIndex>(VEC_FILE_CLASSID), bytes);
+  append_big_endian(static_cast<FileIndex>(entries.size()), bytes);
   for (const double entry : entries) append_big_endian(entry, bytes);
 }
 

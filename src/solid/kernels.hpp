@@ -3,6 +3,7 @@
 /// which no neighbour shares and no load acts on:
 ///     strain = B u + Ba a,   a = -H^-1 G u,   H = int Ba' D Ba,   G = int Ba' D B,   hence   B <- B - Ba H^-1 G.
 /// Stiffness and stress then follow from the condensed B at the integration points alone.
+#include "squeal/base/dense.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 #include "squeal/solid/element.hpp"
 

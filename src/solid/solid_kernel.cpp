@@ -71,8 +71,6 @@ Matrix6 elasticity(const Material& material)
 
 using SolidGradients = Eigen::Matrix3Xd;                       // one function a column
 using SolidStrains = Eigen::Matrix<double, 6, Eigen::Dynamic>; // of unit displacements, one a column
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 /// Returns the strains of displacements whose gradients in x, y, z are the columns of g.
 SolidStrains strains_of(const SolidGradients& g)

@@ -15,10 +15,7 @@ namespace squeal
 namespace
 {
 
-using Complex = std::complex<double>;
-using Eigen::Index;
 using Eigen::MatrixXcd;
-using Eigen::MatrixXd;
 using Places = std::vector<Index>;
 
 /// The vectors of one point, one a column, with zeros for shapes that came later.

@@ -12,9 +12,6 @@ namespace squeal
 namespace
 {
 
-using Complex = std::complex<double>;
-using Eigen::Index;
-
 /// M, C, K and K_loss, of which some may be null.
 using Matrices = std::array<Mat, 4>;
 

@@ -15,11 +15,7 @@ namespace squeal
 namespace
 {
 
-using Complex = std::complex<double>;
-using Eigen::Index;
 using Eigen::MatrixXcd;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 constexpr Index sketched_sides = 32; // random vectors: their mean square is off by 25 % (one standard deviation)
 constexpr double basis_band = 1.1;   // of the real modes, over the band

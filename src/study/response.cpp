@@ -18,10 +18,7 @@ namespace squeal
 namespace
 {
 
-using Complex = std::complex<double>;
-using Eigen::Index;
 using Eigen::MatrixXcd;
-using Eigen::MatrixXd;
 
 constexpr double variance = 1. / 3;   // of the random vectors' entries, even in (-1, 1)
 constexpr double least_error = 1e-14; // backward error that no correction makes smaller

@@ -13,9 +13,6 @@ namespace squeal
 namespace
 {
 
-using Complex = std::complex<double>;
-using Eigen::Index;
-
 /// phi^H C_f phi of one pair: by the law, and by the direction of friction.
 struct PairDamping
 {

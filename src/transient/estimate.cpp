@@ -17,7 +17,6 @@ namespace squeal
 namespace
 {
 
-using Complex = std::complex<double>;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // A sliding pair as the mode shakes it, per metre of q and w t = 0 .. 2 pi.

@@ -7,10 +7,6 @@
 namespace squeal
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 MatrixXd LinearContact::solve_leading(const MatrixXd& right) const
 {
   MatrixXd x = Eigen::PermutationMatrix<Eigen::Dynamic>(order_) * right;

@@ -19,10 +19,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 constexpr std::size_t at_once = 64; // columns: their work vectors take ten times a column's memory
 
 /// The products of the columns at a step's start, and its work vectors.

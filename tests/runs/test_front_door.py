@@ -56,6 +56,8 @@ def test_the_next_command_can_be_pasted(tmp_path, squeal):
     assert "'probe.0.name=a holder'\\''s'" in run.report["next"]
     silent = Short([PIN, *MODES, "--set", "friction.coefficient=0.01"], 1, tmp_path / "silent").report
     assert silent["heard"].startswith("silent") and "sweep.key=friction.coefficient" in silent["next"]
+    own = Short([PIN, *MODES, "--set", "contact.0.friction=0.01"], 1, tmp_path / "own").report
+    assert "sweep.key=contact.0.friction" in own["next"]
 
 
 def test_a_number_drives_two_keys_as_both_by_hand(converged, tmp_path):

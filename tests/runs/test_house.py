@@ -179,3 +179,15 @@ def test_sources_are_formatted():
     files = [str(f) for f in sources("src", "include", "tests")]
     done = subprocess.run(["clang-format", "--dry-run", "--Werror", *files], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[:2000]
+
+
+def test_functions_named_with_their_file_are_there():
+    """As `judge` (`shooting/verdict.cpp`), or `run.cpp`: `exit_code_of`."""
+    texts = [p.read_text() for folder in ("src", "inputs", "tools") for p in (ROOT / folder).rglob("*.md")]
+    texts += [f.read_text() for f in sources("src", "include")]
+    named = {pair for text in texts for pair in re.findall(r"`(\w+)` \(`?([\w/]+\.[ch]pp)`?\)", text)}
+    named |= {(name, file) for text in texts for file, name in re.findall(r"`([\w/]+\.[ch]pp)`: `(\w+)`", text)}
+    assert len(named) > 4
+    wrong = [pair for pair in sorted(named) if not any(re.search(rf"\b{pair[0]}\(", f.read_text())
+                                                       for f in sources("src", "include") if str(f).endswith("/" + pair[1]))]
+    assert not wrong, wrong

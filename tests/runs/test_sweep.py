@@ -272,6 +272,7 @@ def test_equilibrium_alone(converged):
     (sweep_of(directions="all"), "none of one, both"),
     (sweep_of(stages="squeal"), "none of equilibrium, modes"),
     (["--set", "sweep.key=friction.coefficient"], "give a range"),
+    ([*sweep_of(), "--set", "contact.0.friction=0.3"], "changes nothing, since each contact has friction of its own"),
 ])
 def test_bad_sweeps_are_refused_before_the_first_stage(settings, words, squeal):
     run = squeal(*OSCILLATOR, *settings, "--dry-run", ranks=1)

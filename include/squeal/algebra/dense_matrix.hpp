@@ -1,10 +1,9 @@
 #pragma once
 /// Dense matrices that are whole on one rank or on all: copies, broadcasts, shares and linear systems.
+#include "squeal/base/dense.hpp"
 #include "squeal/base/petsc.hpp"
 
 #include <cmath>
-#include <complex>
-#include <Eigen/Core>
 #include <span>
 #include <vector>
 

@@ -1,9 +1,9 @@
 #pragma once
 /// Distributed vectors side by side: a sparse matrix is read once for every sixteen of them, and products among them
 /// are dense matrix products. Every function is collective; small matrices are whole on every rank.
+#include "squeal/base/dense.hpp"
 #include "squeal/base/petsc.hpp"
 
-#include <Eigen/Core>
 #include <functional>
 #include <span>
 

@@ -7,6 +7,7 @@
 /// Where all pairs are driven, rows are normal ones alone: M then holds the friction.
 /// Semismooth Newton on the statuses. A status leaves each pair as many unknowns as it has rows, and a linear system.
 /// The step in time has the same law with velocities for displacements. Arithmetic of one rank.
+#include "squeal/base/dense.hpp"
 #include "squeal/contact/pair_law.hpp"
 
 #include <Eigen/LU>
