@@ -104,7 +104,10 @@ class Deck:
             return [int(text)]
         if text.upper() not in self.nodes.items and text.upper() in self.elements.sets.items:
             raise Problem(f"{place}: '{text}' is a set of elements; expected a node or a set of nodes, as *NSET, NSET=NAME, ELSET={text} makes of it")
-        return self.nodes.get(text, place, "the node set")
+        found = self.nodes.get(text, place, "the node set")
+        if not found:
+            self.note(f"what is said of the set {text}, which has no nodes", place.partition(": ")[0])
+        return found
 
     def face_group(self, text, place, what):
         """The name of a surface or of a set of nodes, as the deck writes it first; None of one whose faces are left out."""
@@ -336,6 +339,8 @@ def read_boundaries(deck):
             else:
                 numbers = nodes.get(name, place, "the node set")
                 name = nodes.names[name.upper()]
+                if not numbers:
+                    deck.note(f"*BOUNDARY of the set {name}, which has no nodes", place)
             motions, value = motions_of(fields, place, name, deck)
             for n in numbers:
                 if n not in deck.used and n in model.nodes:

@@ -11,20 +11,24 @@ ORTHOTROPIC = ("ENGINEERING CONSTANTS", "ORTHOTROPIC", "ORTHO")
 
 
 def read_materials(deck):
-    model, current = deck.model, None
+    model, current, name = deck.model, None, ""
     for block in deck.blocks:
         if block.name == "MATERIAL":
-            current = model.materials.setdefault(block.options.get("NAME", "").upper(), {})
+            name = block.options.get("NAME", "").upper()
+            current = model.materials.setdefault(name, {})
         elif block.name in ("ELASTIC", "DENSITY", "DAMPING"):
             if current is None:
                 raise Problem(f"{block.place}: *{block.name} before any *MATERIAL; expected it below one")
             if block.name == "DAMPING":
                 keys = (("ALPHA", "alpha"), ("BETA", "beta"), ("STRUCTURAL", "loss_factor"))
-                current.update((key, number(block.options[of], block.place)) for of, key in keys if of in block.options)
+                given = {key: number(block.options[of], block.place) for of, key in keys if of in block.options}
+                current.update(given)
+                model.material_places.update(((name, key), block.place) for key in given)
                 continue
             kind = block.options.get("TYPE", "ISOTROPIC").upper() if block.name == "ELASTIC" else ""
             if kind in ORTHOTROPIC:
                 current["orthotropic"] = orthotropic(block, kind)
+                model.material_places[name, "orthotropic"] = block.place
                 continue
             if block.name == "ELASTIC" and not kind.startswith("ISO"):
                 deck.note(f"*ELASTIC, TYPE={kind}", block.place)
@@ -34,6 +38,7 @@ def read_materials(deck):
             if len(rows) > 1:
                 model.notes.append(f"all but the first line of *{block.name} ({deck.line_of(block.place)}), as of other temperatures")
             for place, fields in rows[:1]:
+                model.material_places.update(((name, key), place) for key in (("density",) if block.name == "DENSITY" else ("young", "poisson")))
                 if block.name == "DENSITY":
                     current["density"] = number(fields[0], place)
                 else:
@@ -112,6 +117,8 @@ def read_sections(deck):
             continue
         name = block.options.get("ELSET", "")
         numbers = elements.sets.get(name, block.place, "the element set")
+        if not numbers:
+            deck.note(f"*{block.name} of the set {name}, which has no elements", block.place)
         part = Part([], block.options.get("MATERIAL", "").upper())
         turned = block.options.get("ORIENTATION", "")
         if turned and turned.upper() not in known:
@@ -119,6 +126,7 @@ def read_sections(deck):
         part.axes = axes.get(turned.upper())
         if block.name == "SHELL SECTION":
             read_thickness(block, part, deck)
+            part.place = block.place
             part.offset = -part.thickness * offset_of(block, deck)
         shown = elements.sets.names[name.upper()]
         kinds = FLAT if block.name == "SHELL SECTION" else KINDS

@@ -121,6 +121,7 @@ def pairs(block, deck):
         elif block.name == "CONTACT PAIR" and "TIED" not in block.options:
             names = [name or f"FILL IN [a surface]: {of} of the deck has no faces of solids or shells" for name, of in zip(names, fields)]
             deck.steps.pairs.append((*names, law))
+            deck.model.contact_places[tuple(names)] = place
         elif None in names:
             deck.note(f"*{block.name}, whose surface {fields[names.index(None)]} has no faces", place)
         else:
@@ -183,7 +184,7 @@ def concentrated(block, deck):
             deck.note(f"*CLOAD of degree of freedom {direction}", place)
             continue
         if nodes and nodes[0] in deck.pretension:
-            tighten(deck, nodes[0], value)
+            tighten(deck, nodes[0], value, place)
             continue
         alone = [n for n in nodes if n not in deck.used]
         shared = [n for n in nodes if n in deck.used]
@@ -197,8 +198,10 @@ def concentrated(block, deck):
             loads["force", target] = load
 
 
-def tighten(deck, node, value):
-    if value > 0:
+def tighten(deck, node, value, place):
+    if value <= 0:
+        deck.note(f"the tension {value:g} of the bolt of node {node}: one above 0 tightens it", place)
+    else:
         deck.tension[node] = value
         if node not in deck.steps.tightened:
             deck.steps.tightened.append(node)
@@ -284,7 +287,7 @@ def bolt_name(deck, node):
 def add_bolt(deck, node, block, axis):
     options, model = block.options, deck.model
     if node not in deck.tension:
-        deck.note(f"*PRE-TENSION SECTION of node {node}, which no *CLOAD tightens", block.place)
+        deck.note(f"*PRE-TENSION SECTION of node {node}, which no *CLOAD above 0 tightens", block.place)
         return
     keys = {"name": bolt_name(deck, node), "tension": deck.tension[node]}
     surface = deck.face_group(options["SURFACE"], block.place, "*PRE-TENSION SECTION: the surface") if options.get("SURFACE") else None

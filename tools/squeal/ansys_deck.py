@@ -336,6 +336,7 @@ def material_data(words, place, deck):
             return
     if label.upper() not in ("UVID", "UMID"):  # names of Workbench
         deck.constants.setdefault(whole(material, place), {})[label.upper()] = number(value, place)
+        deck.model.material_places[whole(material, place), ELASTIC.get(label.upper(), "orthotropic" if label.upper() in ORTHOTROPIC else label.upper())] = place
 
 
 def key_option(words, place, deck):

@@ -112,7 +112,7 @@ def add_bolt(deck, section, node, pairs, place):
     force = deck.tension.get(section, model.joints.forces.get(node, [0.0])[0])
     faces = [face for face in model.free_faces(model.solids()).values() if side.issuperset(face)]
     if force <= 0 or not faces:
-        what = "which no force on its node and no SLOAD tightens" if faces else "whose nodes cover no face of solids"
+        what = f"which {'a force of ' + format(force, 'g') if force else 'no force on its node and no SLOAD'} tightens" if faces else "whose nodes cover no face of solids"
         deck.note(f"PRETS179 of section {section}, {what}: its sides stay apart", place)
         return
     model.join_nodes(pairs)

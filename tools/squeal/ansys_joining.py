@@ -122,6 +122,7 @@ def pairs(deck, rotors):
             continue
         if behaviour := BEHAVIOURS.get(deck.options.get((pair.get("type"), 12), 0)):
             model.notes.append(f"that the contact of real constant {real} is {behaviour}: it may open, and slides at its MU")
+        model.contact_places[tuple(names)] = model.material_places.get((pair["material"], "MU"), "")
         keys = {"friction": deck.constants.get(pair["material"], {}).get("MU", 0.0)}
         for side, more in ((Side.TARGET, {}), (Side.CONTACT, {"slave": "rotor"})):
             keys |= {"rotation": rotors[real, side], **more} if (real, side) in rotors else {}

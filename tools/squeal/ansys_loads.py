@@ -18,6 +18,8 @@ def nodes_of(words, place, deck):
         return ansys_selection.selected_nodes(words, place, deck)
     named = next((nodes for name, nodes in deck.model.node_sets.items() if name.upper() == text.upper()), None)
     if named is not None:
+        if not named:
+            deck.note(f"{words[0]} on the component {text}, which has no nodes", place)
         return named
     first = whole(text, place, "a node, a component of nodes, or ALL")
     last, step = (whole(word or "0", place) for word in (words[5:7] + ["0", "0"])[:2])

@@ -137,6 +137,8 @@ def selected_nodes(words, place, deck):
     if state.unread:
         deck.note(f"{','.join(words).upper()} on the nodes of {state.unread}: name them in a component and select it by CMSEL", place)
         return []
+    if state.nodes == []:
+        deck.note(f"{','.join(words).upper()} while no node is selected", place)
     return list(deck.model.nodes) if state.nodes is None else state.nodes
 
 

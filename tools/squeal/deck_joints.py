@@ -220,6 +220,9 @@ class Tables:
 
     def make_spring(self, a, b, direction, keys, where):
         ends = [node for node in (a, b) if node is not None]
+        if not any(keys.values()):
+            self.note(f"the spring at node {a} ({where}), of stiffness and damping 0")
+            return
         if not self.are_known(ends, "the spring", where):
             return
         if sum(self.kinds[node] == "group" for node in ends) > 1:

@@ -6,6 +6,7 @@ import numpy as np
 from squeal.abaqus_deck import read_inp
 from squeal.ansys_deck import read_cdb
 from squeal.common import counted
+from squeal.deck_checks import check_model
 from squeal.deck_files import Problem
 from squeal.mesh_model import FLAT, KINDS, Part
 from squeal.nastran_deck import read_bdf
@@ -68,6 +69,7 @@ def finished(model, file):
     model.name_faces_of_node_sets()
     model.drop_ties_without_faces()
     split_orders(model)
+    check_model(model)
     gap_contacts_without_faces(model)
     turn_supports_on_axes(model)
     if not model.parts:
@@ -89,7 +91,7 @@ def split_orders(model):
             shown, taken = model.unused(f"{name}_linear"), set(linear)
             model.notes.append(f"that {counted(len(linear), 'element')} of {name} are linear beside quadratic ones: they are the part {shown}")
             model.parts[shown] = Part(linear, part.material, part.thickness, part.offset)
-            model.parts[shown].axes = part.axes
+            model.parts[shown].axes, model.parts[shown].place = part.axes, part.place
             part.elements = [n for n in part.elements if n not in taken]
 
 

@@ -63,6 +63,7 @@ class Part:
     def __init__(self, elements, material=None, thickness=0.0, offset=0.0):
         self.elements, self.material, self.thickness = elements, material, thickness
         self.offset = offset  # of shells: from the nodes to the middle surface, along the normal
+        self.place = ""  # in the deck, of its thickness
         self.axes = None  # of an orthotropic material: axis_1 and axis_2, or cylinder
 
 
@@ -78,11 +79,13 @@ class Model:
         self.surfaces = {}  # name: faces, each a tuple of nodes in gmsh's order
         self.node_sets = {}  # name: nodes
         self.materials = {}  # name: {"young": , "poisson": , "density": , "loss_factor": , "alpha": , "beta": }
+        self.material_places = {}  # where a material has a key, or None for all of its keys, by both
         self.loss_factor = 0.0  # of all parts, beside those of their materials
         self.loss_frequency = 0.0  # [Hz] of their viscous equivalent
         self.supports = []  # (name of a node set, motions, other keys of its table)
         self.ties = []  # (slave, master)
         self.contacts = []  # (slave, master, other keys of its table)
+        self.contact_places = {}  # by slave and master
         self.rotors = []  # (part, other keys of its table)
         self.forces = []  # (name of a node set, keys): on groups; those on nodes of their own are among the joints
         self.pressures = []  # (name of a surface, keys)

@@ -39,6 +39,9 @@ def add_bolt(card, deck, tension):
     elements = card.fields[1:2] if card.name == "PRETENS" else card.fields[2:] if card.field(3) == "1" else []
     bars = {name for name, *_ in model.joints.beams}
     found = [f"bar_{element}" for element in elements if f"bar_{element}" in bars]
+    if tension.get(number, 1.0) <= 0:
+        deck.note(f"{card.name} {number} of the tension {tension[number]:g}: one above 0 tightens it", card)
+        return
     if number not in tension:
         deck.note(f"{card.name} {number}, which no force tightens", card)
         return

@@ -37,6 +37,7 @@ def add_pairs(card, regions, deck):
             deck.model.ties.append(sides)
         else:
             reach = deck.number(row[5] or "0", card)
+            deck.model.contact_places[sides] = card.place
             deck.model.contacts.append((*sides, {"friction": deck.number(row[3] or "0", card), **({"reach": reach} if reach > 0 else {})}))
 
 

@@ -252,9 +252,13 @@ def read_supports(cards, case, deck):
         if card.name == "SPC1":
             nodes = [n for n in listed(card.fields[2:], card.place, max(model.nodes)) if n in model.nodes]
             held.setdefault((card.field(2), card.field(3), 0.0), []).extend(nodes)
+            if not nodes:
+                deck.note(f"SPC1 {card.field(2)} of nodes that are not defined", card)
         elif card.name == "SPC":
             for i in (3, 6):
-                if card.field(i):
+                if card.field(i) and card.whole(i) not in model.nodes:
+                    deck.note(f"SPC {card.field(2)} of node {card.field(i)}, which is not defined", card)
+                elif card.field(i):
                     held.setdefault((card.field(2), card.field(i + 1), card.number(i + 2, 0.0)), []).append(card.whole(i))
     for card in cards.odd_grids:
         if (card.field(8) or default).strip("0"):

@@ -317,6 +317,7 @@ def contact(card, deck):
     elif what not in ("SLIDE", ""):
         deck.note(f"{what} of CONTACT {card.field(2)}: it is smooth", card)
     deck.model.contacts.append((slave, master, keys))
+    deck.model.contact_places[slave, master] = card.place
 
 
 def friction_of(card, deck):

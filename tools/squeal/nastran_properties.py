@@ -37,6 +37,8 @@ def read_materials(cards, deck):
     for card in cards:
         if card.name == "PARAM":
             values[card.field(2).upper()] = card
+        elif card.name in ("MAT1", "MAT2", "MAT8", "MAT9", "MATORT"):
+            model.material_places[card.field(2), None] = card.place
     model.loss_frequency = max(values[name].number(3, 0.0) if name in values else 0.0 for name in ("W3", "W4")) / (2 * np.pi)
     others = sorted(set(values) - {"WTMASS", "G", "POST", "W3", "W4"})
     if others:
@@ -137,7 +139,8 @@ def read_properties(cards, deck, of_property):
                                    "is a surface; a [[part]] with a thickness makes shells of it")
         elif flat:
             for offset, of in offsets_of(cards, card, thickness, flat).items():
-                model.parts[model.unused(name if not solid else name + "_shells")] = Part(of, material, thickness, offset)
+                part = model.parts[model.unused(name if not solid else name + "_shells")] = Part(of, material, thickness, offset)
+                part.place = card.place if card else ""
             note_shell_property(card, model)
 
 

@@ -178,8 +178,8 @@ def material(model, part):
     else:
         for key, unit in (("young", "Pa"), ("poisson", "-")):
             missing = key not in known or (known[key] == 0 and key != "poisson")
-            keys[key] = f"FILL IN [{unit}]: {lacks}" if missing else known[key]
-    keys["density"] = known["density"] if known.get("density") else f"FILL IN [kg/m3]: {lacks}"
+            keys[key] = f"FILL IN [{unit}]: {'the deck has none, or 0' if key in known else lacks}" if missing else known[key]
+    keys["density"] = known["density"] if known.get("density") else f"FILL IN [kg/m3]: {'the deck has none, or 0' if 'density' in known else lacks}"
     damping = {**known, "loss_factor": known.get("loss_factor", 0) + model.loss_factor}
     keys |= {key: damping[key] for key in ("loss_factor", "alpha", "beta") if damping.get(key)}
     keys |= {"offset": part.offset} if part.offset else {}
