@@ -113,9 +113,9 @@ std::string command_of(int argc, char** argv)
 
 } // namespace
 
-bool is_scene_folder(const std::filesystem::path& folder)
+bool is_scene(const std::filesystem::path& path)
 {
-  return is_file(folder / scene_file);
+  return path.extension() == ".toml" || is_file(path / scene_file);
 }
 
 Arguments take_arguments(int& argc, char** argv)
@@ -144,7 +144,7 @@ Arguments take_arguments(int& argc, char** argv)
       }
     else if (word.starts_with("--") || asks_for_ranks(word))
       arguments.problem = unknown_argument(word);
-    else if (arguments.scene.empty() && word[0] != '-' && (word.ends_with(".toml") || is_scene_folder(word)))
+    else if (arguments.scene.empty() && word[0] != '-' && is_scene(word))
       arguments.scene =
           word.ends_with(".toml") ? std::filesystem::path(word) : std::filesystem::path(word) / scene_file;
     else
@@ -175,7 +175,7 @@ std::string argument_page()
 void become_tool(int argc, char** argv)
 {
   namespace fs = std::filesystem;
-  if (argc < 2 || !is_plain_word(argv[1]) || is_scene_folder(argv[1])) return;
+  if (argc < 2 || !is_plain_word(argv[1]) || is_scene(argv[1])) return;
   std::error_code code;
   const fs::path program = fs::read_symlink("/proc/self/exe", code), prefix = program.parent_path().parent_path();
   for (const fs::path& folder : {prefix / "tools", prefix / "share/squeal/tools"})

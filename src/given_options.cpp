@@ -150,8 +150,7 @@ std::string hint_of_scene(const std::string& word)
   std::error_code failed;
   for (const auto& folder : {name.parent_path(), std::filesystem::path("inputs")})
     for (const auto& entry : std::filesystem::directory_iterator(folder.empty() ? "." : folder, failed))
-      if (is_scene_folder(entry.path()) || entry.path().extension() == ".toml")
-        known.push_back(folder / entry.path().filename());
+      if (is_scene(entry.path())) known.push_back(folder / entry.path().filename());
   const std::string under = (std::filesystem::path("inputs") / name).string();
   return std::ranges::find(known, under) == known.end() ? spelling_hint(name.string(), known)
                                                         : "; did you mean '" + under + "'?";
@@ -163,9 +162,9 @@ void examine(GivenOptions& given)
   for (std::size_t i = 0; i < words.size(); ++i)
   {
     if (!is_option(words[i]))
-      throw Error((is_scene_folder(words[i]) ? "a second scene '" : "there is no scene '") + shortened(words[i]) +
+      throw Error((is_scene(words[i]) ? "a second scene '" : "there is no scene '") + shortened(words[i]) +
                   "': a scene is one file that ends in .toml, or a folder that holds a scene.toml" +
-                  (is_scene_folder(words[i]) ? "; a run takes one" : hint_of_scene(words[i])));
+                  (is_scene(words[i]) ? "; a run takes one: take the other out" : hint_of_scene(words[i])));
     const bool has_value = i + 1 < words.size() && !is_option(words[i + 1]);
     const std::string name = words[i].substr(1), value = has_value ? words[++i] : "";
     if (const std::string problem = problem_of_option(name, value); !problem.empty()) throw Error(problem);

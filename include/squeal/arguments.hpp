@@ -34,8 +34,8 @@ struct Arguments
   std::string problem;              // said after MPI is up, once
 };
 
-/// Whether a folder holds the file of a scene.
-bool is_scene_folder(const std::filesystem::path& folder);
+/// Whether a path is named as a scene file is, or is a folder that holds one.
+bool is_scene(const std::filesystem::path& path);
 
 /// Takes squeal's own arguments out of argv; what stays is PETSc's.
 Arguments take_arguments(int& argc, char** argv);

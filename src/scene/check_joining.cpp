@@ -269,13 +269,6 @@ void doubt_contacts(const Scene& scene, double length, std::vector<std::string>&
   }
 }
 
-void doubt_cycle(const Scene& scene, std::vector<std::string>& doubts)
-{
-  if (scene.cycle.enabled && scene.fidelity == CycleModel::reduced && scene.cycle.tolerance > 0 && !scene.branch)
-    doubts.push_back("cycle.tolerance is for the full model's shooting: with fidelity = \"reduced\" nothing uses it, "
-                     "and accuracy decides");
-}
-
 /// Whether contacts may feed a structure of parts in which nothing takes energy.
 bool has_no_damping(const Scene& scene)
 {
@@ -312,8 +305,14 @@ std::vector<std::string> doubts_about(const Scene& scene, double length, double 
       doubts.push_back("the number '" + name + "' of [numbers] stands nowhere in the scene");
   if (has_no_damping(scene))
     doubts.push_back("nothing damps the structure: modes that friction couples grow at any friction; give [damping]");
+  const auto slides_smoothly = [](const Contact& contact) { return !is_undriven(contact) && !contact.friction; };
+  if (std::max(scene.friction.coefficient, scene.friction.static_coefficient) == 0 && !scene.sweep &&
+      std::ranges::any_of(scene.contacts, slides_smoothly))
+    doubts.push_back("contacts slide and nothing gives them friction, so it is 0: give [friction] coefficient");
   if (length > 0) doubt_contacts(scene, length, doubts);
-  doubt_cycle(scene, doubts);
+  if (scene.cycle.enabled && scene.fidelity == CycleModel::reduced && scene.cycle.tolerance > 0 && !scene.branch)
+    doubts.push_back("cycle.tolerance is for the full model's shooting: with fidelity = \"reduced\" nothing uses it, "
+                     "and accuracy decides");
   return doubts;
 }
 

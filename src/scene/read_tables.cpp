@@ -154,7 +154,8 @@ void merge_list(const std::string& key, toml::array& list, toml::table& from)
     std::vector<std::string> known;
     toml::node* entry = entry_of(list, wanted, known);
     if (!entry)
-      throw Error(place_of(value) + ": no [[" + key + "]] is called '" + wanted + "'" + hint_or_list(wanted, known));
+      throw Error(place_of(value) + ": " + key + " has no entry '" + wanted + "'" +
+                  (list.is_array_of_tables() ? hint_or_list(wanted, known) : "; known: " + joined(known)));
     if (entry->is_table() != value.is_table())
       throw Error(place_of(value) + ": expected " + key + "." + wanted + (entry->is_table() ? ".KEY=VALUE" : "=VALUE"));
     if (entry->is_table())

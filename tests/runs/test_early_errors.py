@@ -30,6 +30,15 @@ OPTIONS = {
     "ranks among the arguments": (["--ranks", "4"], ["--ranks", "RANKS=4", "mpirun -n 4"]),
     "ranks as the launcher takes them": (["-n", "4"], ["unknown argument -n", "mpirun -n 4"]),
     "an argument near to none": (["--zzzzzzzzzzz"], ["--zzzzzzzzzzz; squeal -help lists"]),
+    "a scene twice": ([OSCILLATOR], ["a second scene", "take the other out"]),
+    "a scene that is not there twice": (["other.toml"], ["a second scene 'other.toml'"]),
+    "a number that a list has not": (["--set", "force.0.vector.3=1"], ["--set force.0.vector.3=1: vector has no entry '3'; known: 0, 1, 2"]),
+    "an entry that a list has not": (["--set", "contact.5.gap=0"], ["contact has no entry '5'; did you mean '0'?"]),
+    "a number for a table": (["--set", "friction=0.3"], ["[friction] is a table, not a number"]),
+    "a number for a list": (["--set", "contact=3"], ["'contact' is a list"]),
+    "a number for an entry": (["--set", "contact.0=3"], ["contact.0.KEY=VALUE"]),
+    "no key": (["--set", "=.277"], ["--set =.277", "KEY=VALUE"]),
+    "a unit beside a number": (["--set", "contact.0.gap=0.1mm"], ["gap = '0.1mm'", "not text [m]"]),
     "no such word": (["-cycle_finish", "magic"], ["-cycle_finish", "multisecant"]),
     "zero": (["-response_tolerance", "0"], ["-response_tolerance", "above 0"]),
     "text for a number": (["-cycle_max_periods", "many"], ["-cycle_max_periods", "many"]),
@@ -70,10 +79,13 @@ OPTIONS = {
 }
 
 
-@pytest.mark.parametrize("name", OPTIONS)
-def test_one_message_before_the_first_stage(squeal, name):
+ON_TWO_RANKS = ("a scene twice", "a number that a list has not", "a number for a table", "no key")
+
+
+@pytest.mark.parametrize("name, ranks", [(name, ranks) for name in OPTIONS for ranks in ((1, 2) if name in ON_TWO_RANKS else (1,))])
+def test_one_message_before_the_first_stage(squeal, name, ranks):
     given, words = OPTIONS[name]
-    refused(squeal(OSCILLATOR, *given, ranks=1), *words)
+    refused(squeal(OSCILLATOR, *given, ranks=ranks), *words)
 
 
 def scene_of(given):

@@ -42,6 +42,24 @@ def test_a_contact_that_touches_nowhere_is_warned_of(converged):
     assert "nothing touches" not in touching.printed
 
 
+@pytest.mark.parametrize("drive", ["contact.0.velocity=[1,0,0]", 'rotor=[{part="disc",velocity=[1,0,0]}]'])
+def test_sliding_without_friction_is_warned_of(converged, tmp_path, drive):
+    scene = OSCILLATOR.read_text()
+    head, law, tail = scene.partition("[friction]")
+    lines = tail.splitlines(keepends=True)
+    next_table = next(i for i, line in enumerate(lines) if line.startswith("["))
+    text = head + "".join(lines[next_table:])
+    if drive.startswith("rotor"):
+        text = "".join(line for line in text.splitlines(keepends=True) if not line.startswith("velocity"))
+    assert law and "coefficient" not in text.replace("#", "")
+    (tmp_path / "scene.toml").write_text(text)
+    said = "contacts slide and nothing gives them friction, so it is 0: give [friction] coefficient"
+    dry = [tmp_path / "scene.toml", "--dry-run", "--set", drive]
+    assert said in converged(*dry, ranks=1).printed
+    for given in ("friction.coefficient=0.1", "contact.0.friction=0"):
+        assert said not in converged(*dry, "--set", given, ranks=1).printed
+
+
 def test_a_band_without_modes_is_warned_of_with_the_length_of_the_model(converged, tmp_path):
     scene = brick_scene(tmp_path)
     assert "no mode lies below" not in converged(scene, ranks=1).printed

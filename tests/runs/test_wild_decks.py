@@ -183,7 +183,8 @@ def test_habits_of_bulk_data(tmp_path, head, text, notes):
 
 def test_rigid_bushings_quadratic_shells_and_sections_by_stations(tmp_path):
     more = ("PBUSH,4,K,RIGID,2.,,,,RIGID\nCBUSH,11,4,100,101,1.,0.,0.\nPBEAML,5,1,,ROD\n,.1,,YES,.5,.1\nCBEAM,12,5,100,101,1.,0.,0.\n"
-            "PSHELL,9,1,.01,1\nGRID,30,,3.,0.,0.\nGRID,31,,4.,0.,0.\nGRID,32,,4.,1.,0.\nGRID,33,,3.,1.,0.\nCQUAD8,20,9,30,31,32,33\nCTRIA6,21,9,30,31,32\nCQUADR,22,9,30,31,32,33\nCTRIAR,23,9,30,31,32\n")
+            "PSHELL,9,1,.01,1\nGRID,30,,3.,0.,0.\nGRID,31,,4.,0.,0.\nGRID,32,,4.,1.,0.\nGRID,33,,3.,1.,0.\nGRID,34,,5.,0.,0.\nGRID,35,,5.,1.,0.\nGRID,36,,6.,0.,0.\n"
+            "CQUAD8,20,9,30,31,32,33\nCTRIA6,21,9,34,36,35\nCQUADR,22,9,31,34,35,32\nCTRIAR,23,9,30,31,36\n")
     scene, left_out = converted(tmp_path, "BEGIN BULK\n" + GRIDS + more, "deck.fem")
     assert scene["connector"][0]["locked"] == "x rz" and scene["connector"][0]["stiffness"] == [0, 2, 0, 0, 0, 0]
     assert scene["beam"][0]["diameter"] == pytest.approx(0.2)
