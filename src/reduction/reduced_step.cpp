@@ -23,10 +23,8 @@ struct Iterate
   VectorXd& r;
   VectorXd& w;  // W r + b
   double speed; // [m/s] the largest of b
-  const std::vector<double>& past;
+  PairFriction friction;
   int directions = map.model.directions;
-  PairFriction friction =
-      law_of_step(sliding_on(map.model.friction, PairView<const double>(past, directions)), map.theta);
   PairRows<Index> rows{directions};
 
   std::size_t pairs() const { return map.own.size(); }
@@ -97,7 +95,9 @@ bool solve_contact(const ReducedMap& map, const VectorXd& b, ReducedContact& con
   extrapolate(contact.r, contact.r_before);
   extrapolate(contact.Wr, contact.Wr_before);
   contact.w = b + contact.Wr;
-  Iterate iterate{map, contact.r, contact.w, b.cwiseAbs().maxCoeff(), contact.past};
+  const PairView<const double> past(contact.past, map.model.directions);
+  Iterate iterate{map, contact.r, contact.w, b.cwiseAbs().maxCoeff(),
+                  law_of_step(sliding_on(contact.friction, past), map.theta)};
   admit(iterate);
   const double tolerance = map.contact.tolerance;
   double worst = largest_defect(iterate);
@@ -219,6 +219,8 @@ bool find_reactions(const ReducedMap& map, const VectorXd& Gv_free, ReducedConta
   const ReducedModel& model = map.model;
   const VectorXd free = free_contact_velocity(map, contact, Gv_free);
   const auto reactions = [&] { return PairView<const double>(contact.r, model.directions); };
+  contact.friction =
+      at_release(model.friction, reactions(), PairView<const double>(contact.r_before, model.directions));
   const VectorXd sliding = contact_velocity(model, contact.velocity);
   contact.past =
       past_sliding(PairView(contact.velocity, model.directions), TangentView(model.drive, model.directions),

@@ -82,7 +82,8 @@ void lead_back(const OneStep& one, const std::vector<double>& position, const St
 struct StepProblem
 {
   std::vector<double> free; // where W is
-  std::vector<double> past; // as sliding_direction.hpp says
+  std::vector<double> past; // as interface.hpp says
+  PairFriction friction;
 };
 
 StepProblem make_problem(const OneStep& one, const std::vector<double>& Bv_free)
@@ -94,7 +95,12 @@ StepProblem make_problem(const OneStep& one, const std::vector<double>& Bv_free)
   check(VecWAXPY(work.v_theta, step.h * (1 - step.theta), state.v, state.u)); // ut, for a moment
   const std::vector<std::vector<double>> motion = relative(interface, std::array{work.v_theta.get(), state.v.get()});
   const std::vector<double>&position = motion[0], &velocity = motion[1];
-  StepProblem problem{free_contact_velocity(one, {position, velocity, state.slip}, Bv_free), {}};
+  const auto& known = work.memory.r; // the last solutions
+  const bool goes_on = known.size() > 1 && known[0] == state.reactions;
+  StepProblem problem{free_contact_velocity(one, {position, velocity, state.slip}, Bv_free),
+                      {},
+                      at_release(scaled(interface, factors.friction), PairView(state.reactions, interface.directions),
+                                 PairView(goes_on ? known[1] : std::vector<double>(), interface.directions))};
   std::vector<ContactStatus> before =
       status_with(interface, law_before, factors.drive_start, state.reactions, velocity);
   hold_anchors(interface, position, before, work.anchors);
@@ -129,9 +135,8 @@ bool solve_once(const OneStep& one, const ContactSettings& settings, StepProblem
 {
   const auto& [step, interface, factors, work, state, report] = one;
   const std::vector<double> b = sum(problem.free, problem.past);
-  const PairFriction law = law_of_step(
-      sliding_on(scaled(interface, factors.friction), PairView<const double>(problem.past, interface.directions)),
-      step.theta);
+  const PairFriction law =
+      law_of_step(sliding_on(problem.friction, PairView<const double>(problem.past, interface.directions)), step.theta);
   const ContactResult result = solve_contact(step.W, law, settings, {b, state.reactions, work.memory});
   report.contact_iterations += result.iterations;
   report.contact_residual = result.residual;

@@ -111,6 +111,21 @@ def test_falling_friction_drives_stick_slip_beside_stable_sliding(converged, tmp
     assert abs(motion["frequency_hz"] - frequency) < motion["frequency_error"] < 0.02 * frequency
 
 
+@pytest.mark.parametrize("speed, steps, frequency, energy", [(0.1, 64, 0.1254129, 0.017716), (0.5, 64, 0.1586535, 0.135480),
+                                                             (0.54, 100, 0.1587792, 0.155127), (0.56, 64, None, None)])
+def test_few_steps_see_stick_slip_that_just_lasts(converged, tmp_path, speed, steps, frequency, energy):
+    """Friction 0.3 and 0.5 at rest alone. By closed forms between events the cycle lasts up to 0.547 m/s."""
+    scene = block_on_belt(tmp_path, 1.0, 1.0, 0.02, 1.0, speed, {"coefficient": 0.3, "static_coefficient": 0.5}, modes={"band": 1.0},
+                          cycle={"steps_per_period": steps})
+    report = converged(scene, ranks=1).report
+    seen = [motion for motion in report["attractors"]["motions"] if motion["kind"] != "rest"]
+    assert report["heard"].startswith("silent: no mode grows in the band") and ("but" in report["heard"]) == bool(frequency)
+    assert len(seen) == bool(frequency)
+    for motion in seen:
+        assert motion["kind"] == "steady" and abs(motion["frequency_hz"] - frequency) <= motion["frequency_error"] < 5e-4
+        assert abs(motion["mean_fluctuating_energy"] - energy) <= motion["energy_error"] < 0.02 * energy
+
+
 @pytest.mark.parametrize("rest, sliding, speed, steps", [(0.6, 0.2, 0.05, 100), (0.6, 0.2, 0.05, 400), (0.4, 0.3, 0.02, 200), (0.5, 0.0, 0.1, 150)])
 def test_two_levels_of_friction_have_exact_stick_slip(converged, tmp_path, rest, sliding, speed, steps):
     """Without damping the block is let go at rest D = (rest - sliding) N/k beyond steady sliding. Sliding that just keeps ahead of the

@@ -149,6 +149,10 @@ std::vector<double> past_sliding(PairView<const double> velocity, TangentView<co
 /// were any: contact is then to be solved again.
 bool leave_out_where_turned(PairView<const double> r, PairView<const double> w, PairView<double> past);
 
+/// The laws of a step before which the reactions were `last`, and `before` a step earlier; no pairs: unknown. Of two
+/// levels of mu a pair that stuck has that of rest until the line through both uses of its friction comes to 1.
+PairFriction at_release(PairFriction friction, PairView<const double> last, PairView<const double> before);
+
 /// The laws of a solution with this past. Pairs that slide on have no level of rest: the step of slower ones ends with
 /// s+ = -s where friction could hold them.
 PairFriction sliding_on(const PairFriction& friction, PairView<const double> past);

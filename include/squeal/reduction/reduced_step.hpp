@@ -20,7 +20,8 @@ struct ReducedContact
   Eigen::VectorXd Wr{};                    // [m/s] empty: to be formed, as G q and G v of the state
   Eigen::VectorXd r_before{}, Wr_before{}; // of the step before; empty: none
   Eigen::VectorXd position{}, velocity{};  // [m, m/s] G q, G v
-  std::vector<double> past{};              // [m/s] w_t - s+, as sliding_direction.hpp says
+  std::vector<double> past{};              // [m/s] w_t - s+, as interface.hpp says
+  PairFriction friction{};                 // of the step
 };
 
 /// The period map of the reduced model by theta steps (src/README.md, section 4), with matrices for each step size:
