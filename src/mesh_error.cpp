@@ -15,16 +15,6 @@ namespace squeal
 namespace
 {
 
-/// Normal reactions over areas [Pa].
-std::vector<double> pressures_of(const Interface& interface, const Equilibrium& equilibrium)
-{
-  std::vector<double> result;
-  const PairView pairs(equilibrium.reactions, equilibrium.directions);
-  for (const ContactPair& pair : interface.geometry)
-    result.push_back(pairs.normal(result.size()) / std::max(pair.area, std::numeric_limits<double>::min()));
-  return result;
-}
-
 /// Takes fields of the scene's mesh to the finer one.
 class Prolongation
 {
@@ -66,17 +56,16 @@ public:
     return result;
   }
 
-  /// Pressures of the scene's mesh at pairs of the finer one [Pa]; NaN where one that they come from is open.
-  std::vector<double> pressures(const Equilibrium& equilibrium) const
+  /// The pairs of the finer mesh that the scene's mesh has closed: of new nodes, where all they come from are.
+  std::vector<char> closed_pairs(const Equilibrium& equilibrium) const
   {
-    std::vector<double> at_nodes(coarse_.mesh.nodes.size(), std::nan(""));
-    const std::vector<double> own = pressures_of(coarse_.interface, equilibrium);
-    for (std::size_t i = 0; i < own.size(); ++i)
-      if (equilibrium.closed[i]) at_nodes[static_cast<std::size_t>(coarse_.interface.geometry[i].node)] = own[i];
-    std::vector<double> result;
+    std::vector<double> open(coarse_.mesh.nodes.size(), std::nan("")); // else 0
+    for (std::size_t i = 0; i < equilibrium.closed.size(); ++i)
+      if (equilibrium.closed[i]) open[static_cast<std::size_t>(coarse_.interface.geometry[i].node)] = 0;
+    std::vector<char> result;
     for (const ContactPair& pair : fine_.interface.geometry)
-      result.push_back(
-          sum_over_parents(static_cast<std::size_t>(pair.node), [&](std::size_t node) { return at_nodes[node]; }));
+      result.push_back(!std::isnan(
+          sum_over_parents(static_cast<std::size_t>(pair.node), [&](std::size_t node) { return open[node]; })));
     return result;
   }
 
@@ -112,10 +101,12 @@ MeshError skipped(const std::string& reason)
   return result;
 }
 
-/// Finds, for each mode, the mode most like it on the finer mesh with these closed pairs; without vectors if there is
-/// none.
-std::vector<Eigenpair> find_finer(std::span<const ComplexMode* const> modes, const Prolongation& prolong,
-                                  const SlidingEquilibrium& sliding, const PencilOptions& options)
+/// An eigenvalue [1/s] and its backward error; infinite: there is none.
+using Found = std::pair<std::complex<double>, double>;
+
+/// Finds the eigenvalue of the mode most like each one on the finer mesh with these closed pairs.
+std::vector<Found> find_finer(std::span<const ComplexMode* const> modes, const Prolongation& prolong,
+                              const SlidingEquilibrium& sliding, const PencilOptions& options)
 {
   constexpr double beside = 1e-4, lowest = 0.5, highest = 1.4; // of the frequency
   constexpr int passes = 30;
@@ -124,7 +115,7 @@ std::vector<Eigenpair> find_finer(std::span<const ComplexMode* const> modes, con
   const QuadraticProblem problem = sliding_problem(sliding.structure, linearised);
   const Owned<Mat> K_loss = sliding_loss(sliding.structure, linearised);
   ShiftInvert pencil = make_shift_invert(linearised.K_z, linearised.M_z, Keep::factor, options);
-  std::vector<Eigenpair> result(modes.size());
+  std::vector<Found> result(modes.size(), {{}, HUGE_VAL});
   for (std::size_t k = 0; k < modes.size(); ++k)
   {
     const Owned<Vec> real = prolong(modes[k]->real), imaginary = prolong(modes[k]->imaginary);
@@ -133,7 +124,7 @@ std::vector<Eigenpair> find_finer(std::span<const ComplexMode* const> modes, con
     const double square = std::norm(modes[k]->lambda);
     move_to(pencil, (1 + beside) * square);
     // a step of inverse iteration: a prolongation is stiff where the coarse elements were not
-    QuadraticSolution found =
+    const QuadraticSolution found =
         solve_on_subspace(problem, K_loss, pencil.factor->solve(product(linearised.M_z, start)), pencil.factor.get(),
                           {.window = {lowest * lowest * square, highest * highest * square},
                            .passes = passes,
@@ -141,14 +132,14 @@ std::vector<Eigenpair> find_finer(std::span<const ComplexMode* const> modes, con
                            .tolerance = 1e-12,
                            .sharp = 1e-13});
     double best = 0;
-    for (Eigenpair& pair : found.pairs)
+    for (const Eigenpair& pair : found.pairs)
     {
       const std::array vector{pair.real.get(), pair.imaginary.get()};
       const Eigen::MatrixXd products = inner_products(columns_of(vector), start);
       const double like = std::hypot(products(0, 0) + products(1, 1), products(0, 1) - products(1, 0));
       if (!(like > best) || !(pair.backward_error < 1e-8)) continue;
       best = like;
-      result[k] = std::move(pair);
+      result[k] = {pair.lambda, pair.backward_error};
     }
   }
   return result;
@@ -180,39 +171,19 @@ MeshError on_finer_model(const SlidingPoint& point, const Model& fine, const Pro
   result.outcome = {OutcomeKind::converged, "", 0, 0};
   const std::vector<const ComplexMode*> modes = modes_at_stake(point.modes);
   const SlidingEquilibrium sliding{fine.structure, fine.interface, equilibrium};
-  const std::vector<Eigenpair> own = find_finer(modes, prolong, sliding, options.modes.pencil);
+  const std::vector<Found> own = find_finer(modes, prolong, sliding, options.modes.pencil);
 
-  const std::vector<double> before = prolong.pressures(point.equilibrium),
-                            now = pressures_of(fine.interface, equilibrium);
-  std::vector<char> held, staying; // pairs closed on the scene's mesh; where pressures change once more as they did
-  double open_part = 0;            // of the faces of those that do not stay, at most
-  for (std::size_t i = 0; i < now.size(); ++i)
-  {
-    held.push_back(!std::isnan(before[i]));
-    const bool opens = equilibrium.closed[i] && 2 * now[i] < before[i];
-    staying.push_back(equilibrium.closed[i] && !opens);
-    // the pressure rises from 2 now - before at the face's edge to now in its middle
-    if (opens) open_part = std::max(open_part, 0.5 * (before[i] - 2 * now[i]) / (before[i] - now[i]));
-  }
-  const bool has_moved = held != equilibrium.closed;
-  const std::vector<char>& closed = has_moved ? held : staying;
-  std::vector<Eigenpair> with_others;
-  if (closed != equilibrium.closed)
+  std::vector<Found> held = own;
+  if (const std::vector<char> closed = prolong.closed_pairs(point.equilibrium); closed != equilibrium.closed)
   {
     equilibrium.closed = closed;
-    with_others = find_finer(modes, prolong, sliding, options.modes.pencil);
+    held = find_finer(modes, prolong, sliding, options.modes.pencil);
   }
-  const std::vector<Eigenpair>& others = with_others.empty() ? own : with_others;
   for (std::size_t k = 0; k < modes.size(); ++k)
-  {
-    const double error = own[k].real.get() && others[k].real.get() ? own[k].backward_error : std::nan("");
-    const std::complex<double> fine_lambda = own[k].lambda, change = others[k].lambda - fine_lambda,
-                               other = fine_lambda + (has_moved ? 1 : open_part) * change;
-    result.modes.push_back({modes[k]->lambda, fine_lambda, has_moved ? other : fine_lambda, other, error});
-    result.outcome.residual = std::max(result.outcome.residual, error);
-    if (!result.modes.back().is_known())
+    if (std::isinf(own[k].second) || std::isinf(held[k].second))
       result.outcome = {OutcomeKind::not_converged, "a mode was not found on the finer mesh", 0, 0};
-  }
+    else
+      result.modes.push_back({modes[k]->lambda, own[k].first, held[k].first, own[k].second});
   return result;
 }
 

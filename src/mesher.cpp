@@ -1,9 +1,10 @@
 /// squeal_mesher: reads a mesh, or meshes a geometry, with libgmsh. squeal starts it; see src/mesh/mesh_file.cpp.
 ///
-///   squeal_mesher shut-in NAME SIZES [parameter value]…   reads the file of this name in a sandbox
-///   squeal_mesher free NAME SIZES [parameter value]…      lets a geometry run what it holds
+///   squeal_mesher shut-in NAME SIZES DIVISIONS [parameter value]…   reads the file of this name in a sandbox
+///   squeal_mesher free NAME SIZES DIVISIONS [parameter value]…      lets a geometry run what it holds
 ///
-/// SIZES is a script that gives the sizes of elements, or an empty text.
+/// SIZES is a script that gives the sizes of elements, or an empty text. Where DIVISIONS of the mesh follow, the answer
+/// has the places of new nodes on the geometry.
 ///
 /// The answer goes to a descriptor of its own. This program knows no MPI.
 ///
@@ -38,7 +39,7 @@ using namespace squeal;
 void initialise(int argc, char** argv)
 {
   std::vector<std::string> arguments = {"squeal_mesher"};
-  for (int i = 4; i + 1 < argc; i += 2) arguments.insert(arguments.end(), {"-setnumber", argv[i], argv[i + 1]});
+  for (int i = 5; i + 1 < argc; i += 2) arguments.insert(arguments.end(), {"-setnumber", argv[i], argv[i + 1]});
   std::vector<char*> pointers;
   for (std::string& argument : arguments) pointers.push_back(argument.data());
   gmsh::initialize(static_cast<int>(pointers.size()), pointers.data(), false);
@@ -125,16 +126,52 @@ void take_sizes(const std::string& file)
   gmsh::merge(file);
 }
 
-FileMesh read_or_generate(const std::string& file, const std::string& sizes)
+/// Reads the middles of edges and faces on curves and surfaces of the geometry, where gmsh puts the nodes of second
+/// order. Those of straight sides are left out.
+void read_middles(FileMesh& mesh)
+{
+  constexpr double straight = 1e-6; // of half an edge
+  FileMesh curved;                  // its nodes have other numbers, its elements the same order
+  gmsh::model::mesh::setOrder(2);
+  read_blocks(read_nodes(curved), curved);
+  for (std::size_t b = 0; b < mesh.blocks.size(); ++b)
+  {
+    const ElementBlock &block = mesh.blocks[b], &second = curved.blocks.at(b);
+    const int corners = block.nodes_per_element, all = second.nodes_per_element;
+    if (block.type > 3) continue; // lines, triangles and quadrangles of first order are 1 to 3
+    for (int node = 0; node < static_cast<int>(second.nodes.size()); ++node)
+    {
+      const int first = node / all * corners, middle = node % all - corners;
+      if (middle < 0) continue;
+      NodeWeights parents;
+      Vec3 mean{};
+      const int from = middle == 4 ? 0 : middle,
+                between = middle == 4 ? 4 : 2; // the fifth one of a quadrangle is its own
+      for (int corner = from; corner < from + between; ++corner)
+      {
+        parents.emplace_back(block.nodes[first + corner % corners], 1. / between);
+        mean = mean + parents.back().second * mesh.nodes[parents.back().first];
+      }
+      const Vec3& place = curved.nodes[second.nodes[node]];
+      if (norm(place - mean) <= straight * norm(mesh.nodes[parents[0].first] - mean)) continue;
+      std::sort(parents.begin(), parents.end());
+      mesh.middles[parents] = place;
+    }
+  }
+}
+
+FileMesh read_or_generate(const std::string& file, const std::string& sizes, bool is_divided)
 {
   gmsh::open(file);
   if (!sizes.empty()) take_sizes(sizes);
-  if (!has_elements()) gmsh::model::mesh::generate(3);
+  const bool is_geometry = !has_elements();
+  if (is_geometry) gmsh::model::mesh::generate(3);
   std::string problem;
   gmsh::logger::getLastError(problem);
   if (!problem.empty()) throw std::runtime_error(problem);
   FileMesh mesh;
   read_blocks(read_nodes(mesh), mesh);
+  if (is_geometry && is_divided) read_middles(mesh);
   return mesh;
 }
 
@@ -144,7 +181,7 @@ MesherAnswer answer_of(int argc, char** argv)
   try
   {
     initialise(argc, argv);
-    answer.mesh = read_or_generate(argv[2], argv[3]);
+    answer.mesh = read_or_generate(argv[2], argv[3], argv[4] != std::string("0"));
   }
   catch (const std::string& text) // libgmsh before 4.9 throws strings
   {
@@ -232,7 +269,7 @@ std::string shut_in()
 
 int main(int argc, char** argv)
 {
-  if (argc < 4) return 2;
+  if (argc < 5) return 2;
   prctl(PR_SET_PDEATHSIG, SIGKILL); // with squeal it ends too
 #ifndef __SANITIZE_ADDRESS__        // it reserves more addresses than there are bytes
   limit_memory();

@@ -7,11 +7,11 @@
 /// With d = held - lambda(h) the limit is lambda(h/2) + d/(2^q - 1). The order q is not known: at corners and edges of
 /// contact it is below that of the elements, 2 or 4. Orders from 1 on put the limit between lambda(h/2) and lambda(h/2)
 /// + d; the middle is the corrected value. Its bar is half of |d|, and |lambda(h/2) - held| beside it: the border of
-/// the contact falls between nodes as it may, on the finer mesh as on the first. Where both meshes have the same closed
-/// pairs, those that open where pressures change once more as they did take held's place, by the part of their faces
-/// that opens.
+/// the contact falls between nodes as it may, on the finer mesh as on the first. Straight sides of a geometry's round
+/// parts become rounder with the first division, so that they are part of d.
 ///
-/// Caveat: a mesh that is too coarse has no order yet. The geometry's own curvature is not found again.
+/// Caveat: a mesh that is too coarse has no order yet. A mesh file, or a mesh that mesh.refine divided, keeps its
+/// straight sides.
 #include "squeal/options.hpp"
 #include "squeal/transient/sliding_point.hpp"
 

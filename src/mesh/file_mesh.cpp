@@ -6,7 +6,7 @@ namespace squeal
 {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ElementBlock, dimension, type, type_name, nodes_per_element, nodes, groups)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FileMesh, nodes, blocks)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FileMesh, nodes, blocks, middles)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MesherAnswer, mesh, problem, left_open)
 
 std::string packed(const MesherAnswer& answer)

@@ -228,7 +228,7 @@ std::vector<std::string> arguments_of(const MeshSource& source)
 {
   const char* rights = source.statements == Statements::any ? free_mesher : shut_in_mesher;
   std::vector<std::string> arguments = {mesher_program().string(), rights, source.file.string(),
-                                        source.size_field.string()};
+                                        source.size_field.string(), std::to_string(source.refine)};
   for (const auto& [name, value] : source.parameters)
   {
     arguments.push_back(name);
@@ -338,6 +338,7 @@ FileMesh read_mesh_file(const MeshSource& source)
     throw Error(name + ": gmsh cannot read or mesh it: " + answer.problem +
                 (refused ? "; no file is written unless --allow-scripts is given" : ""));
   for (Vec3& node : answer.mesh.nodes) node = source.scale * node;
+  for (auto& [parents, middle] : answer.mesh.middles) middle = source.scale * middle;
   return std::move(answer.mesh);
 }
 

@@ -287,7 +287,7 @@ std::string undecided_by_mesh(const Report& report)
   const auto open = std::ranges::find_if(modes, &ModeOnFinerMesh::is_undecided);
   if (open == modes.end()) return {};
   return format("; whether the mode at %.5g Hz grows is undecided by the mesh (growth rate %.3g +- %.2g 1/s)",
-                frequency_hz_of(open->lambda), open->corrected().real(), open->growth_bar());
+                frequency_hz_of(open->lambda), open->corrected().real(), open->bar().real());
 }
 
 std::string what_is_heard(const Report& report, const Scene& scene)

@@ -70,12 +70,10 @@ void add_mode_error(Entry out, const ModeOnFinerMesh& mode)
   out.show("finer_growth_rate", "1/s", "the growth rate there", mode.finer.real());
   out.add("held_frequency_hz", "Hz", "that with the closed pairs of the scene's mesh", frequency_hz_of(mode.held));
   out.add("held_growth_rate", "1/s", "the growth rate with them", mode.held.real());
-  out.add("other_growth_rate", "1/s", "the growth rate with other closed pairs than its own that it may have",
-          mode.other.real());
   out.brief("corrected_frequency_hz", "Hz", "the frequency where both meshes lead", frequency_hz_of(mode.corrected()));
   out.error("frequency_error", "its bar", mode.bar().imag() / two_pi);
   out.brief("corrected_growth_rate", "1/s", "the growth rate where both meshes lead", mode.corrected().real());
-  out.error("growth_error", "its bar", mode.growth_bar());
+  out.error("growth_error", "its bar", mode.bar().real());
   out.show("undecided", "switch", "the bar holds zero growth, or growth of the other sign", mode.is_undecided());
   out.add("backward_error", "-", "backward error on the finer mesh", mode.backward_error);
 }
@@ -87,9 +85,7 @@ void add_mesh_error(Entry whole, const MeshError& error)
   out.add("outcome", "whether the modes were found on the finer mesh", error.outcome.kind);
   out.text("reason", "why not", error.outcome.reason);
   out.add("dofs", "-", "degrees of freedom of the finer mesh", error.dofs);
-  std::vector<ModeOnFinerMesh> known;
-  std::ranges::copy_if(error.modes, std::back_inserter(known), &ModeOnFinerMesh::is_known);
-  out.list("modes", add_mode_error, known);
+  out.list("modes", add_mode_error, error.modes);
   if (!error.outcome.reason.empty())
     whole.warn(Severity::note, format("no error of the mesh: %s", error.outcome.reason.c_str()));
 }

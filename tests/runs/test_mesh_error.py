@@ -21,6 +21,18 @@ def test_the_error_of_exact_cases_is_known(squeal, tmp_path, element, case, mesh
             assert abs(mode["corrected_" + name] - value) <= mode[error]
 
 
+@pytest.mark.parametrize("element", ["hex8", "wedge6", "tet4"])
+def test_a_divided_mesh_is_as_round_as_its_geometry(squeal, tmp_path, element):
+    """The ring's section is the polygon of all nodes on its circles: 8 n chords a quarter once the sides of n = 1, 2 were halved, and again
+    8 n after one more division, which leaves the sides straight. Without nodes on the geometry there would be 4 n."""
+    for n, refine in ((1, 0), (1, 1), (2, 1), (1, 2)):
+        write_case(tmp_path, "thick ring", element, n)
+        report = squeal(tmp_path / "scene.toml", "--set", f"mesh.refine={refine}", ranks=1).report
+        chords = 4 * n * (2 if refine else 1)
+        area = (0.32**2 - 0.145**2) / 2 * chords * math.sin(math.pi / 2 / chords)
+        assert report["model"]["parts"][0]["mass"] == pytest.approx(7850 * 0.0225 * area, rel=1e-9)
+
+
 COARSE_PIN = [INPUTS / "pin_on_disc" / "scene.toml", "--set", "mesh.parameters.divisions=2", "--set", "cycle.enabled=false", "--set",
               "estimate.enabled=false", "--set", "modes.band=6000"]
 

@@ -144,6 +144,26 @@ TEST_CASE("the parents of a new node give its place by weights that add up to on
   }
 }
 
+TEST_CASE("a middle on the geometry takes the place of that of the straight side, in the first division")
+{
+  FileMesh file = single(references[0]);
+  const Vec3 edge{0.5, -0.1, 0.05}, face{0.5, 0.5, -0.1};
+  file.middles = {{{{0, 0.5}, {1, 0.5}}, edge}, {{{0, 0.25}, {1, 0.25}, {2, 0.25}, {3, 0.25}}, face}};
+  refine(file, 1);
+  int moved = 0;
+  for (std::size_t i = 0; i < file.parents.size(); ++i)
+  {
+    Vec3 at{};
+    for (const auto& [node, weight] : file.parents[i]) at = at + weight * file.nodes[static_cast<std::size_t>(node)];
+    const Vec3& place = file.nodes[brick.size() + i];
+    if (place == edge || place == face)
+      ++moved;
+    else
+      CHECK(norm(at - place) < 1e-14);
+  }
+  CHECK(moved == 2);
+}
+
 TEST_CASE("neighbours share their new nodes, and surfaces and groups are carried over")
 {
   const TemporaryFile file(blocks, ".geo");

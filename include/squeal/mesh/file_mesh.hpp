@@ -3,6 +3,7 @@
 /// the mesher to the program. This header knows no MPI, because the mesher knows none. Not collective.
 #include "squeal/base/vec3.hpp"
 
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,7 +30,8 @@ struct FileMesh
 {
   std::vector<Vec3> nodes; // in the unit of the file
   std::vector<ElementBlock> blocks;
-  std::vector<NodeWeights> parents{}; // of the last nodes, which the last division made of those before
+  std::vector<NodeWeights> parents{};    // of the last nodes, which the last division made of those before
+  std::map<NodeWeights, Vec3> middles{}; // of straight edges and faces, where the geometry has them elsewhere
 };
 
 /// The answer of the mesher: a mesh, or why there is none.

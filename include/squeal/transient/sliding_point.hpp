@@ -12,22 +12,19 @@ namespace squeal
 /// A mode on the scene's mesh and on the finer one.
 struct ModeOnFinerMesh
 {
-  std::complex<double> lambda, finer; // [1/s]
-  std::complex<double> held, other;   // finer ones: with the closed pairs of the scene's mesh; with others than its own
-  double backward_error = 0;          // of the finer ones; NaN: one was not found
+  std::complex<double> lambda, finer, held; // [1/s]; held: the finer one with the closed pairs of the scene's mesh
+  double backward_error = 0;                // of the finer ones
 
   std::complex<double> corrected() const { return finer + (held - lambda) / 2.; }
   /// The bar of `corrected`: of growth [1/s] in the real part, of angular frequency [rad/s] in the imaginary one.
   std::complex<double> bar() const
   {
-    const std::complex<double> smooth = (held - lambda) / 2., contact = finer - other;
+    const std::complex<double> smooth = (held - lambda) / 2., contact = finer - held;
     return {std::abs(smooth.real()) + std::abs(contact.real()), std::abs(smooth.imag()) + std::abs(contact.imag())};
   }
-  double growth_bar() const { return bar().real(); }
 
   /// Whether the limit may grow where the mode does not, or the other way.
-  bool is_undecided() const { return is_known() && (lambda.real() > 0 ? 1 : -1) * corrected().real() <= growth_bar(); }
-  bool is_known() const { return !std::isnan(backward_error); }
+  bool is_undecided() const { return (lambda.real() > 0 ? 1 : -1) * corrected().real() <= bar().real(); }
 };
 
 /// The modes about which the mesh was asked (squeal/mesh_error.hpp).
