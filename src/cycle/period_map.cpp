@@ -61,6 +61,7 @@ void complete_rate(PeriodMap& map, StepWork& work, State& end, Vec rate)
 void begin_record(PeriodMap& map, Vec start)
 {
   map.records.clear();
+  map.events.clear();
   map.records.resize(static_cast<std::size_t>(map.steps));
   map.recorded_start = copy_of(start);
   map.recorded_step = map.step.h;
@@ -160,6 +161,55 @@ void note_joints(PeriodMap& map, Vec start)
   map.rest.follow(map.sliding, map.options.factor, map.joints);
 }
 
+namespace
+{
+
+/// Records the steps from the state, which goes on; `after` each one.
+void record_steps(PeriodMap& map, int steps, State& state, const std::function<void()>& after)
+{
+  map.records = std::vector<StepRecord>(static_cast<std::size_t>(steps));
+  const auto watch = [&](const StepReport&, const StepWork&)
+  {
+    if (after) after();
+    end_if_asked(comm_of(state.u));
+    return true;
+  };
+  take_steps(map.step, map.sliding.structure, map.sliding.interface, state, steps, {map.records, {}, watch});
+}
+
+/// Records the steps and the events inside them, from a state some steps on where an event lies at the start.
+void record_with_events(PeriodMap& map, int steps, State start)
+{
+  const auto clear_steps = [&](const StepEvent& event) {
+    return event.end > steps ? event.end - steps + 2 : event.first < 2 ? event.end + 2 : 0;
+  };
+  constexpr int attempts = 4;
+  for (int attempt = 0; attempt < attempts; ++attempt)
+  {
+    State state = copy_of(start);
+    const Vec u = state.u, v = state.v;
+    MultiVector path_u = columns_of(std::span(&u, 1)), path_v = columns_of(std::span(&v, 1));
+    path_u.entries.conservativeResize(Eigen::NoChange, steps + 1);
+    path_v.entries.conservativeResize(Eigen::NoChange, steps + 1);
+    const auto keep = [&, k = Eigen::Index{0}]() mutable
+    {
+      ++k;
+      path_u.entries.col(k) = columns_of(std::span(&u, 1)).entries;
+      path_v.entries.col(k) = columns_of(std::span(&v, 1)).entries;
+    };
+    record_steps(map, steps, state, keep);
+    map.events = events_inside_steps(map.step, map.sliding.interface, {map.records, path_u, path_v, start.u});
+    long on = 0;
+    for (const StepEvent& event : map.events) on = std::max(on, clear_steps(event));
+    if (on == 0) return;
+    copy_column(path_u, on, start.u);
+    copy_column(path_v, on, start.v);
+    start.reactions = map.records[static_cast<std::size_t>(on - 1)].reactions;
+  }
+}
+
+} // namespace
+
 void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& grid)
 {
   const int steps = grid.steps(map.steps);
@@ -168,9 +218,9 @@ void record_period(PeriodMap& map, double period, Vec start, const TimeGrid& gri
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
   if (grid.shift > 0) move_by_part(map, grid.shift, state);
   map.recorded_start = {};
-  map.records = std::vector<StepRecord>(static_cast<std::size_t>(steps));
-  const auto after = [&](const StepReport&, const StepWork&) { return end_if_asked(comm_of(start)), true; };
-  take_steps(map.step, map.sliding.structure, map.sliding.interface, state, steps, {map.records, {}, after});
+  map.events.clear();
+  if (grid.events) return record_with_events(map, steps, std::move(state));
+  record_steps(map, steps, state, {});
   if (grid.shift > 0 || steps != map.steps) return;
   map.recorded_start = copy_of(start);
   map.recorded_step = map.step.h;
@@ -183,7 +233,7 @@ void apply_tangent(const PeriodMap& map, std::span<const Vec> states)
 {
   std::vector<TangentColumn> columns;
   for (const Vec state : states) columns.push_back({copy_of(displacement(state)), copy_of(velocity(state))});
-  advance_tangents(map.step, map.sliding.structure, map.sliding.interface, map.records, columns);
+  advance_tangents(map.step, map.sliding.structure, map.sliding.interface, map.records, map.events, columns);
   for (std::size_t k = 0; k < states.size(); ++k)
   {
     check(VecCopy(columns[k].u, displacement(states[k])));

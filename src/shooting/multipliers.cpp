@@ -36,10 +36,9 @@ std::vector<Complex> along_eight_periods(const Monodromy& monodromy, const Whole
   }
   columns += periods * static_cast<long>(places.size());
   const Eigen::MatrixXd V = real_columns(pairs, space.right.columns());
-  monodromy.flow.record_period(periods * orbit.period, orbit.state, {0, periods, 1});
+  monodromy.flow.record_period(periods * orbit.period, orbit.state, {0, periods, 1, true});
   const Eigen::MatrixXd image =
       inner_products(space.left, image_of(monodromy, combination(space.right, V(Eigen::all, places))));
-  monodromy.flow.record_period(orbit.period, orbit.state, {});
   // vectors of motions that contact takes away may be parallel: they have no part in the others' rows
   const Eigen::MatrixXd projected = V.completeOrthogonalDecomposition().solve(image)(places, Eigen::all);
   if (!projected.allFinite()) return {};
@@ -90,9 +89,9 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
     finite = finite && whole.allFinite();
     return finite ? solve_dense_unsymmetric(whole) : std::vector<DenseEigenpair>();
   };
-  const std::vector<DenseEigenpair> pairs = pairs_on({});
-  const std::vector<Complex> own = values_of(pairs), later = values_of(pairs_on({0.5, 1})),
-                             finer = values_of(pairs_on({0, 2}));
+  const std::vector<DenseEigenpair> pairs = pairs_on({0, 1, 0, true});
+  const std::vector<Complex> own = values_of(pairs), later = values_of(pairs_on({0.5, 1, 0, true})),
+                             finer = values_of(pairs_on({0, 2, 0, true}));
   const Owned<Vec> rate = copy_of(orbit.rate.get());
   const std::size_t shift = find_shift(pairs, inner_products(space.left, block_of(std::span(&rate, 1))).col(0));
   // over eight periods the orbit's own error must not lead away from it
@@ -105,7 +104,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
     multipliers.would_decide = "the tangent of this period is not finite: other steps a period would decide";
     return result;
   }
-  if (!stays) monodromy.flow.record_period(orbit.period, orbit.state, {});
+  monodromy.flow.record_period(orbit.period, orbit.state, {});
   multipliers.trivial_error = std::max(std::abs(own[shift] - 1.), std::abs(values[shift] - 1.));
   const std::vector<std::size_t> at_later = nearest_places(own, later), at_finer = nearest_places(own, finer);
   std::vector<std::size_t> order(values.size());

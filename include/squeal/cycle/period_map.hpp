@@ -36,6 +36,7 @@ struct PeriodMap
   std::vector<StepRecord> records{}; // of the period recorded last, with the step at hand
   Owned<Vec> recorded_start{};       // of that period, if its steps are the flow's own
   double recorded_step = 0;          // [s]
+  std::vector<StepEvent> events{};   // inside the recorded steps, where they are asked for
   bool keeps_step = false;           // where factors and passes of contact cost more than what is neglected
   KeptStep kept{};
   JointMotion joints{}; // of the period integrated last; where there are undriven pairs

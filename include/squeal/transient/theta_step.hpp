@@ -1,6 +1,7 @@
 #pragma once
 /// How steps are made, of the transient and of the cycle.
 #include "squeal/algebra/bordered_factor.hpp"
+#include "squeal/algebra/multivector.hpp"
 #include "squeal/algebra/sparse_matrices.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/contact/contact_operator.hpp"
@@ -170,13 +171,55 @@ StepWork take_steps(const ThetaStep& step, const Structure& structure, const Int
 /// A change of the state, and its cause besides the change of the start.
 struct TangentColumn
 {
-  Owned<Vec> u, v;     // du [m], dv [m/s]
-  double friction = 0; // change of the friction law's coefficient in every step
+  Owned<Vec> u, v;                 // du [m], dv [m/s]
+  double friction = 0;             // change of the friction law's coefficient in every step
+  std::vector<double> reactions{}; // [N] change of r+ in the step taken last
 };
 
 /// From changes at the start of the recorded steps to those at their end, in place. Collective.
 void advance_tangents(const ThetaStep& step, const Structure& structure, const Interface& interface,
                       std::span<const StepRecord> records, std::span<TangentColumn> columns);
+
+// Events of contact inside steps (src/README.md, section 4.14).
+//
+// A motion beside the recorded one meets an event at another time, and leaves it on another flow. The tangent of the
+// steps lacks that where an event's own step has statuses that the motion after it has not.
+
+/// An impact of a pair, a turn of its sliding, or a release from a friction of rest above that of sliding. What passes
+/// zero there is c: the gap, the velocity along the direction of sliding, or what is left to the friction of rest.
+struct StepEvent
+{
+  enum class Kind
+  {
+    impact,
+    turn,
+    release,
+  };
+  Kind kind = Kind::impact;
+  std::size_t pair = 0;
+  long first = 0, end = 0;         // its first step, and the one after its last
+  std::vector<double> weights{};   // c of the pair's rows of B u, B v or r
+  double ahead = 0;                // the event's c is c + ahead (c - the one of the step before)
+  double rate = 0;                 // of c at the event, a second
+  TangentColumn before{}, after{}; // the flow x' at both ends
+};
+
+/// The steps of a closed orbit.
+struct RecordedOrbit
+{
+  std::span<const StepRecord> records;
+  const MultiVector &u, &v; // the states before each step, and the last one
+  Vec pattern;              // of either
+};
+
+/// The events of the orbit in their order, without those that come too close to another one. Collective.
+std::vector<StepEvent> events_inside_steps(const ThetaStep& step, const Interface& interface,
+                                           const RecordedOrbit& orbit);
+
+/// As the other one, with what events of these records do. Those at the very start or end are left out. Collective.
+void advance_tangents(const ThetaStep& step, const Structure& structure, const Interface& interface,
+                      std::span<const StepRecord> records, std::span<const StepEvent> events,
+                      std::span<TangentColumn> columns);
 
 // Refusals of a theta and a step size h that would show a wrong growth (src/README.md, sections 4.10, 4.11).
 // StepOptions::refuse lifts all. A theta < 1/2 also amplifies every stable mode with -Re(lambda) < (1/2 - theta) h
