@@ -97,7 +97,7 @@ ContactOperator::ContactOperator(std::vector<double> columns, int pairs, int dir
   const CondensedStrip own{first_, last_, rows - first_, columns_.data()};
   set_diagonal(own, comm);
   if (static_cast<double>(rows * rows) > entries_in_cache) set_near_field(own, comm);
-  if (near_.empty()) side_by_side_ = in_sequence_ = {all_pairs(diagonal_.size())};
+  if (near_.empty()) turns_ = {all_pairs(diagonal_.size())};
 }
 
 void ContactOperator::set_diagonal(const CondensedStrip& own, MPI_Comm comm)
@@ -126,16 +126,11 @@ void ContactOperator::set_near_field(const CondensedStrip& own, MPI_Comm comm)
       ends(near.of_ranks.begin() + 1, near.of_ranks.end());
   std::vector<std::size_t> middles;
   for (std::size_t rank = 0; rank < begins.size(); ++rank) middles.push_back((begins[rank] + ends[rank]) / 2);
-  for (std::size_t rank = 0; rank < begins.size(); ++rank)
-  {
-    if (begins[rank] == ends[rank]) continue;
-    std::vector<std::size_t> alone = begins;
-    alone[rank] = ends[rank];
-    in_sequence_.push_back(turn_of(near.order, begins, alone, comm));
-  }
-  side_by_side_ = in_sequence_;
-  if (in_sequence_.size() > 1)
-    side_by_side_ = {turn_of(near.order, begins, middles, comm), turn_of(near.order, middles, ends, comm)};
+  const bool alone = ends.front() == ends.back();
+  if (alone)
+    turns_ = {turn_of(near.order, begins, ends, comm)};
+  else
+    turns_ = {turn_of(near.order, begins, middles, comm), turn_of(near.order, middles, ends, comm)};
 }
 
 void ContactOperator::multiply(std::span<const double> x, std::span<double> y) const

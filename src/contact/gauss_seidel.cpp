@@ -2,8 +2,8 @@
 ///
 /// Let w = w_0 + dw with w_0 = W r_0 + b from the last product with W, and dw the effect of the changes since. The
 /// sweeps update dw alone. It is small, so the near field and single precision suffice. Ranks that share W sweep side
-/// by side, turn by turn, each over its own pairs. Where that did not lead to convergence, they sweep one after the
-/// other, and then W itself is swept over. A problem counts as converged only by the residual after a product with W.
+/// by side, turn by turn, each over its own pairs. Where that did not lead to convergence, W itself is swept over. A
+/// problem counts as converged only by the residual after a product with W.
 #include "contact_work.hpp"
 
 #include "squeal/base/broadcast.hpp"
@@ -33,7 +33,6 @@ template <class Entry> struct SweptProblem
   ContactWork& work;
   std::span<const Turn> turns;
   MPI_Comm comm;                                             // ranks that sweep together; MPI_COMM_NULL: this one alone
-  bool side_by_side = false;                                 // over slices whose sweeps may not converge together
   std::vector<Entry> dw = std::vector<Entry>(work.b.size()); // valid in the rows of this rank's pairs
   bool changed = false;                                      // dw is not zero
   bool finished = false; // the sweeps have met their target, or no reaction changes any more
@@ -141,7 +140,7 @@ template <class Entry> bool continues(SweptProblem<Entry>& problem, double resid
   result.converged = result.residual <= settings.tolerance;
   if (result.converged || !std::isfinite(result.residual) || result.iterations >= settings.max_iterations) return false;
   // what is left may be rounding's, or the near field's; or slices act on each other too strongly
-  if (problem.finished || problem.side_by_side) problem.failures = residual > before / 2 ? problem.failures + 1 : 0;
+  if (problem.finished || problem.turns.size() > 1) problem.failures = residual > before / 2 ? problem.failures + 1 : 0;
   problem.finished = false;
   set_target(problem, settings);
   return problem.failures < 2;
@@ -268,18 +267,6 @@ template <class Entry> void sweep_until_converged(SweptProblem<Entry> problem, c
   }
 }
 
-/// Where slices swept side by side led away from the law, the next sweeps begin where these did: at r, and W times it.
-void begin_as_one(ContactWork& work, std::vector<double> r, std::vector<double> Wr)
-{
-  work.result.as_one = true;
-  const double reached = residual_of(work);
-  for (int times = 0; times < 2 && (times == 0 || reached < residual_of(work)); ++times)
-  {
-    work.r.swap(r);
-    work.Wr.swap(Wr);
-  }
-}
-
 /// Sweeps over W itself, on rank 0.
 void sweep_over_whole(ContactWork& work, const ContactSettings& settings)
 {
@@ -299,19 +286,8 @@ void sweep_over_whole(ContactWork& work, const ContactSettings& settings)
 void gauss_seidel(ContactWork& work, const ContactSettings& settings)
 {
   const ContactOperator& W = work.W;
-  const auto is_open = [&] { return !work.result.converged && work.result.iterations < settings.max_iterations; };
-  if (W.has_near_field())
-  {
-    const bool several = W.in_sequence().size() > 1;
-    const std::vector<double> r = work.r, Wr = work.Wr;
-    sweep_until_converged<float>({work, W.side_by_side(), W.shared_by(), several}, settings);
-    if (several && is_open())
-    {
-      begin_as_one(work, r, Wr);
-      sweep_until_converged<float>({work, W.in_sequence(), W.shared_by()}, settings);
-    }
-  }
-  if (is_open()) sweep_over_whole(work, settings);
+  if (W.has_near_field()) sweep_until_converged<float>({work, W.turns(), W.shared_by()}, settings);
+  if (!work.result.converged && work.result.iterations < settings.max_iterations) sweep_over_whole(work, settings);
 }
 
 } // namespace squeal

@@ -233,8 +233,6 @@ void add_transient(Entry out, const Report& report)
             run.history.joint_work);
   out.show("residual", "-", "largest natural map of a pair over the largest reaction", run.outcome.residual);
   out.add("contact_iterations_mean", "-", "mean number of contact iterations a step", run.contact_iterations_mean);
-  out.add("contact_steps_as_one", "-", "steps in which ranks had to sweep one after the other",
-          run.contact_steps_as_one);
   out.add("seconds_per_step", "s", "time of a step", run.seconds_per_step);
   if (std::abs(bias.growth) > 0.1)
     out.warn(Severity::warning,

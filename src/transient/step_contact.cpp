@@ -141,7 +141,6 @@ bool solve_once(const OneStep& one, const ContactSettings& settings, StepProblem
   report.contact_iterations += result.iterations;
   report.contact_residual = result.residual;
   report.contact_converged = result.converged;
-  report.contact_as_one = report.contact_as_one || result.as_one;
   report.fall_of_friction = fall_at_pairs(step.W, law, state.reactions);
   const std::vector<double> w = sum(work.memory.Wr.front(), b);
   if (work.record) work.record->contact_velocity = w;
@@ -156,8 +155,7 @@ void share_from_rank_zero(const OneStep& one, const std::string& problem)
   const MPI_Comm comm = comm_of(one.interface.B);
   StepReport& report = one.report;
   std::vector<double> message{problem.empty() ? 0. : 1., static_cast<double>(report.contact_iterations),
-                              report.contact_residual,   report.contact_converged ? 1. : 0.,
-                              report.fall_of_friction,   report.contact_as_one ? 1. : 0.};
+                              report.contact_residual, report.contact_converged ? 1. : 0., report.fall_of_friction};
   const auto head = static_cast<std::ptrdiff_t>(message.size());
   message.insert(message.end(), one.state.reactions.begin(), one.state.reactions.end());
   MPI_Bcast(message.data(), to_int(message.size()), MPI_DOUBLE, 0, comm);
@@ -166,7 +164,6 @@ void share_from_rank_zero(const OneStep& one, const std::string& problem)
   report.contact_residual = message[2];
   report.contact_converged = message[3] != 0;
   report.fall_of_friction = message[4];
-  report.contact_as_one = message[5] != 0;
   one.state.reactions.assign(message.begin() + head, message.end());
 }
 

@@ -212,9 +212,9 @@ void conclude(Trajectory& trajectory, long asked)
 void describe_march(Checkpoint& checkpoint, const FileOrder& order, MarchSummary& summary, double& iterations,
                     State& state, History& history)
 {
-  describe_all(checkpoint, summary.steps, summary.unconverged, summary.contact_steps_as_one, summary.first_unconverged,
-               summary.contact_residual_max, summary.fall_of_friction_max, summary.energy_defect_max, iterations,
-               state.time, state.reactions, state.slip, history.probes, history.joint_work);
+  describe_all(checkpoint, summary.steps, summary.unconverged, summary.first_unconverged, summary.contact_residual_max,
+               summary.fall_of_friction_max, summary.energy_defect_max, iterations, state.time, state.reactions,
+               state.slip, history.probes, history.joint_work);
   for_each_series([&](auto, auto, auto& series) { describe(checkpoint, series); }, history);
   order.describe(checkpoint, state.u);
   order.describe(checkpoint, state.v);
@@ -252,7 +252,6 @@ MarchSummary march(const ThetaStep& step, const SlidingEquilibrium& sliding, lon
     summary.contact_residual_max = std::max(summary.contact_residual_max, report.contact_residual);
     summary.fall_of_friction_max = std::max(summary.fall_of_friction_max, report.fall_of_friction);
     iterations += report.contact_iterations;
-    summary.contact_steps_as_one += report.contact_as_one;
     const double defect = std::abs(report.energy_defect);
     const double scale = std::max({report.energy, std::abs(report.contact_work), std::abs(report.load_work)});
     if (defect > 0) summary.energy_defect_max = std::max(summary.energy_defect_max, defect / scale);

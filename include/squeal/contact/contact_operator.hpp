@@ -89,9 +89,8 @@ public:
   void add_product(std::size_t pair, const PairVector& change, std::span<float> w) const;
   bool has_near_field() const { return !near_.empty(); }
 
-  /// The turns in which ranks sweep over all pairs: all at once, slices that push each other little, or one by one.
-  const std::vector<Turn>& side_by_side() const { return side_by_side_; }
-  const std::vector<Turn>& in_sequence() const { return in_sequence_; }
+  /// The turns in which ranks sweep over all pairs: all at once, in each over slices that push each other little.
+  const std::vector<Turn>& turns() const { return turns_; }
 
   /// The largest eigenvalue of R W R, R the diagonal matrix of these roots, by power iteration: a lower bound.
   /// Collective of the ranks that share W.
@@ -110,7 +109,7 @@ private:
   std::vector<PairBlock> diagonal_;
   std::vector<NaturalScale> scale_;
   std::vector<NearRow> near_; // of every pair, in the columns of this rank's pairs; empty: W is small
-  std::vector<Turn> side_by_side_, in_sequence_;
+  std::vector<Turn> turns_;
 };
 
 /// The first column of each rank and the end: equal parts of the lower triangle, of whole pairs.

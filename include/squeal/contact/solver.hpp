@@ -42,7 +42,6 @@ struct ContactResult
   int iterations = 0; // sweeps
   double residual = 0;
   bool converged = false;
-  bool as_one = false; // ranks swept one after the other: side by side their sweeps did not converge
 };
 
 /// The last solutions of one trajectory, latest first, and W times them: a warm start then needs no product with W.

@@ -139,7 +139,6 @@ struct StepReport
   int contact_iterations = 0;
   double contact_residual = 0; // natural map, relative
   bool contact_converged = true;
-  bool contact_as_one = false;    // as of ContactResult
   double fall_of_friction = 0;    // largest |mu'| r_n W_t of a pair, at rest: at 1 the step may have several solutions
   std::vector<double> joint_work; // [J] of the undriven pairs of each contact; empty: there are none
 };

@@ -48,8 +48,7 @@ struct MarchSummary
   long steps = 0; // fewer than asked when the energy stopped being finite, or the run is asked to end
   bool interrupted = false;
   long unconverged = 0;
-  long contact_steps_as_one = 0; // in which ranks had to sweep one after the other
-  double first_unconverged = 0;  // [s]
+  double first_unconverged = 0; // [s]
   double contact_residual_max = 0;
   double fall_of_friction_max = 0; // as of StepReport
   double energy_defect_max = 0;    // over the energy of its step, or its works where they are larger
