@@ -178,10 +178,8 @@ std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceL
 }
 
 /// The number of periods over which motions beside the orbit are watched: as many as are asked for. Else as many as
-/// make a motion by the tangent four times as large, where the verdict is not "stable" and these are few. A whole
-/// matrix that says "stable" takes as many as show a decay: a contact that touches and leaves within two steps forgets
-/// when it did. Where only one multiplier's bar leaves it open, it takes as many as are affordable or as the search
-/// took.
+/// make a motion by the tangent four times as large, where the verdict is not "stable" and these are few. Where only
+/// one multiplier's bar leaves it open, it takes as many as are affordable or as the search took.
 long watched_periods(const OrbitProblem& problem, const ShootingOptions& options, const ConvergenceLog& log,
                      const Multipliers& multipliers)
 {
@@ -189,12 +187,10 @@ long watched_periods(const OrbitProblem& problem, const ShootingOptions& options
   const long at_most = is_dear(problem.flow.work) ? 20 : 80; // periods
   if (options.watched_periods >= 0) return options.watched_periods;
   if (multipliers.values.empty()) return 0;
-  constexpr double to_see_it_decay = 32;
   const double affordable = affordable_work / problem.flow.work;
   const bool whole =
       multipliers.method == MultiplierMethod::whole; // a projection's bar is the grid's, of a motion as well
-  if (multipliers.stability == Stability::stable)
-    return whole ? static_cast<long>(std::min(affordable, to_see_it_decay)) : 0;
+  if (multipliers.stability == Stability::stable) return 0;
   const long searched = log.convergence.periods;
   const double largest = std::abs(multipliers.values[deciding_place(multipliers)]);
   long periods = 0;
@@ -206,19 +202,6 @@ long watched_periods(const OrbitProblem& problem, const ShootingOptions& options
     periods =
         std::max(periods, static_cast<long>(std::min(enough, std::max(affordable, static_cast<double>(searched)))));
   return periods;
-}
-
-/// Widens the bar of the multiplier that decides to what the surest motion misses it by, where that is more than both
-/// bars: contact that touches and leaves within steps forgets when it did, and no grid shows it.
-void widen_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers)
-{
-  const SeenGrowth& surest = *std::ranges::min_element(seen, {}, &SeenGrowth::error);
-  const std::size_t place = deciding_place(multipliers);
-  const std::complex<double> followed = multipliers.values[place];
-  const double missed = std::abs(surest.growth - std::abs(followed));
-  if (!(missed > surest.error + multipliers.errors[place])) return;
-  for (std::size_t i = 0; i < multipliers.values.size(); ++i)
-    if (i == place || multipliers.values[i] == std::conj(followed)) multipliers.errors[i] = missed + surest.error;
 }
 
 } // namespace
@@ -248,8 +231,12 @@ void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipli
                                       100 * nearest.part, nearest.growth);
     return;
   }
-  if (multipliers.stability == Stability::stable) widen_by_growth(seen, multipliers);
-  if (multipliers.stability == Stability::unstable && !(nearest.growth - nearest.error > 1))
+  // one that neither grows nor comes back has left for another motion near by
+  const bool comes_back = nearest.growth < 1 && (nearest.periods == 0 ||
+                                                 std::pow(nearest.growth, static_cast<double>(nearest.periods)) < 0.5);
+  const bool is_doubted =
+      multipliers.method == MultiplierMethod::whole ? comes_back : !(nearest.growth - nearest.error > 1);
+  if (multipliers.stability == Stability::unstable && is_doubted)
   {
     multipliers.stability = Stability::undecided;
     multipliers.crossing = Crossing::none;
