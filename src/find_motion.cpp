@@ -264,7 +264,10 @@ void seek_settled_motion(MotionSearch& search, const char* name)
 bool settles_on_another_cycle(const MotionSearch& search)
 {
   const SettledMotion& settled = search.found.settled;
-  if (settled.outcome.kind != OutcomeKind::settled || settled.examined.verdict.kind != MotionKind::periodic)
+  const MotionKind kind = settled.examined.verdict.kind;
+  const bool is_steady = settled.fluctuating_energy.error <= 0.005 * settled.fluctuating_energy.value;
+  if (settled.outcome.kind != OutcomeKind::settled ||
+      !(kind == MotionKind::periodic || (kind == MotionKind::undecided && is_steady)))
     return false;
   constexpr double fewest = 8; // steps in a period
   const double period = period_of(settled.examined.base), step = settled.examined.period / settled.steps_per_period;
@@ -391,7 +394,7 @@ void begin(MotionSearch& search, const StageRunner& run)
   search.not_sought = cycle_not_sought(point, search.start, search.scene);
   if (search.not_sought) return;
   if (only_diverges(followed_modes(point, search.scene))) search.paced = paced_divergence(point);
-  if (point.modes.unstable_count == 0) // the equilibrium is stable, so that the start is given
+  if (point.modes.unstable_count == 0 && search.start.given)
     search.found.followed = mode_of_start(point, *search.start.given);
   search.resumed = kept_cycle(point.model->structure);
 }

@@ -153,7 +153,8 @@ SlidingPoint with_small_motions(SlidingPoint point, const Scene& scene, const Pr
 std::span<const ComplexMode> followed_modes(const SlidingPoint& point, const Scene& scene)
 {
   const CycleStartKind start = scene.cycle.start.kind;
-  const bool given = scene.cycle.enabled && (start == CycleStartKind::file || start == CycleStartKind::transient);
+  const bool given = scene.cycle.enabled && (start == CycleStartKind::file || start == CycleStartKind::transient ||
+                                             (start == CycleStartKind::mode && scene.cycle.amplitude > 0));
   if (point.modes.unstable_count > 0 || !given || point.modes.modes.empty()) return point.modes.unstable();
   return std::span(point.modes.modes).first(1);
 }
@@ -235,6 +236,9 @@ Trajectory find_transient(const SlidingPoint& point, const Scene& scene, const P
   const ComplexMode* followed = reason.empty() ? &point.modes.modes.front() : nullptr;
   const UnstableModes started{followed_modes(point, scene), point.estimates};
   State start = transient_start(point.sliding(), started, settings);
+  if (!std::isfinite(norm_of(start.u, NORM_2)))
+    return not_run<Trajectory>(OutcomeKind::skipped, "no amplitude is known at which contact opens or slip reverses: "
+                                                     "give transient.amplitude, with start = \"mode\"");
   add_initial_motions(*point.model, scene, start);
   return integrate(point.sliding(), followed, settings, options.step, std::move(start), point.model->probes);
 }

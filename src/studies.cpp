@@ -1,5 +1,7 @@
 #include "squeal/find_motion.hpp"
 
+#include "squeal/base/cost.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -23,10 +25,13 @@ Response run_response(const SlidingPoint& point, const Scene& scene, const Progr
 Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const Scene& scene,
                           const ProgramOptions& options)
 {
-  constexpr int enough = 256; // steps a period to recognise a cycle of more steps by
+  constexpr int enough = 256, most = 1024; // steps a period to recognise a cycle of more steps by; where they are few
   CycleSettings settings = scene.cycle;
   const bool open = settings.steps_per_period == 0;
-  if (open) settings.steps_per_period = std::clamp(motion.cycle.steps_per_period, first_steps, enough);
+  const double of_starts = 400. * (starts_sought(point, scene).value_or(0) + 1), // periods
+      cheap_steps = std::min(1e6, affordable_work / work_of_step(point.model->structure)) / of_starts;
+  const int cheap = std::clamp(static_cast<int>(cheap_steps), enough, most);
+  if (open) settings.steps_per_period = std::clamp(motion.cycle.steps_per_period, first_steps, cheap);
   const std::vector<ComplexMode>& modes = point.modes.modes;
   const bool chosen = settings.starts == 0;
   settings.starts = starts_sought(point, scene).value_or(0);

@@ -186,6 +186,7 @@ struct Watched
 {
   State state;                    // where it is
   std::vector<double> energies{}; // [J] fluctuating, of each step
+  bool slides = false;            // all pairs of the equilibrium did, in each step of the last periods
   std::array<double, coordinates> last{}, squares{};
   std::array<std::vector<double>, coordinates> crossings{}; // [s] upwards through zero
 };
@@ -229,6 +230,7 @@ void watch(const Swarm& swarm, double time, Vec Mv, Watched& watched)
 /// Integrates every motion for so many periods more.
 void integrate(Swarm& swarm, long periods)
 {
+  const auto closed = static_cast<int>(std::ranges::count(swarm.problem.sliding.equilibrium.closed, true));
   for (Watched& watched : swarm.motions)
   {
     History history;
@@ -240,11 +242,16 @@ void integrate(Swarm& swarm, long periods)
       throw Interrupted{};
     watched.energies.insert(watched.energies.end(), history.fluctuating_energy.begin(),
                             history.fluctuating_energy.end());
+    watched.slides = std::ranges::all_of(history.slip, [closed](int slipping) { return slipping == closed; });
   }
 }
 
 std::vector<ReachedMotion> reached(const Swarm& swarm)
 {
+  // sliding that small motions do not leave decays to rest, unless friction bends with the speed
+  const auto bends = [](const FrictionLaw& law) { return depends_on_speed(law) && !has_two_levels(law); };
+  const bool falls = swarm.problem.unstable.modes.front().growth_rate() < 0 &&
+                     !any_law(swarm.problem.sliding.interface.friction, bends);
   double least = HUGE_VAL;
   for (const Watched& watched : swarm.motions) least = std::min(least, watched.energies.front());
   std::vector<ReachedMotion> motions;
@@ -255,6 +262,7 @@ std::vector<ReachedMotion> reached(const Swarm& swarm)
     const double frequency = frequency_of(crossings).value,
                  period = frequency > 0 ? 2 / frequency / swarm.step.h : swarm.steps_per_period; // some cross twice
     motions.push_back(reached_by(means_over(watched.energies, period), crossings, at_rest * least));
+    if (falls && watched.slides) motions.back() = {ReachedKind::rest, motions.back().energy, {}, {}};
     motions.back().starts = {motions.size() - 1};
   }
   return motions;

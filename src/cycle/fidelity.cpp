@@ -432,6 +432,13 @@ FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& 
     fidelity.full_seconds += MPI_Wtime() - clock;
   }
   fidelity.steps_per_period = cycle.steps_per_period;
+  if (cycle.multipliers.stability == Stability::stable && cycle.measured.stick_pairs_max > 0 &&
+      any_law(problem.sliding.interface.friction, has_two_levels))
+  {
+    cycle.multipliers.stability = Stability::undecided;
+    cycle.multipliers.would_decide = "friction that falls at once from rest is not seen by the tangent: [cycle] starts "
+                                     "shows which motions attract";
+  }
   const State& start = cycle.measured.start;
   if (!settings.save_state.empty() && start.u.get()) write_state(start, problem.sliding.structure, settings.save_state);
   return found;

@@ -239,13 +239,6 @@ LimitCycle find_cycle_from(CycleProblem& problem, const CycleOptions& options, c
     const OrbitProblem found_again = problem_of(flow, preconditioner, start, problem.settings.tolerance);
     cycle.spreads = spread_over_offsets({map, found_again, options.shooting, log, cycle.orbit, cycle.measured});
   }
-  if (cycle.multipliers.stability == Stability::stable && cycle.measured.stick_pairs_max > 0 &&
-      any_law(problem.sliding.interface.friction, has_two_levels))
-  {
-    cycle.multipliers.stability = Stability::undecided;
-    cycle.multipliers.would_decide = "friction that falls at once from rest is not seen by the tangent: [cycle] starts "
-                                     "shows which motions attract";
-  }
   cycle.costs = {map.step.factor_seconds, map.step.condensed_seconds};
   add_remedies(map, cycle.outcome);
   return cycle;
@@ -263,7 +256,7 @@ std::optional<State> state_on_modes(const SlidingEquilibrium& sliding, const Uns
   const Estimate& estimate = unstable.estimates.front();
   const bool alone = settings.start.kind == CycleStartKind::mode;
   double amplitude = estimate.start_amplitude;
-  if (alone) amplitude = settings.amplitude > 0 ? settings.amplitude : 2 * estimate.lift_off_amplitude;
+  if (alone) amplitude = settings.amplitude > 0 ? settings.amplitude : 2 * limiting_event(estimate);
   if (!(amplitude > 0) || !std::isfinite(amplitude)) return {};
   State start = mode_state(sliding.equilibrium, unstable.modes.front(), amplitude, estimate.phase);
   for (std::size_t i = 1; !alone && i < unstable.modes.size(); ++i)
@@ -301,7 +294,8 @@ LimitCycle find_cycle_from_start(CycleProblem& problem, const CycleOptions& opti
                       first_event(problem.unstable.estimates.front()) * unit_norm(problem),
                       is_cycle,
                       rounds};
-  return find_cycle_from(problem, options, start, {settings.tolerance, is_cycle ? 0 : settings.free_periods});
+  return find_cycle_from(problem, options, start,
+                         {settings.tolerance, is_cycle ? 0 : settings.free_periods, 0, !is_cycle || resumed});
 }
 
 } // namespace squeal

@@ -29,24 +29,6 @@ double step_for(const PeriodMap& map, double period)
   return map.kept.curvature * missing * missing / 2 <= part * map.kept.moved ? map.kept.h : own;
 }
 
-constexpr double neglected = 1e-2; // of what a period moves, by its contact
-
-/// The contact tolerance of a period with its rate, a part of the largest reaction. An error of it in every step moves
-/// the end of the period by about as much. A period of shooting lowers the residual by less than a hundred times.
-/// Passes to less than `loosest` take no time.
-double contact_tolerance_for(const PeriodMap& map)
-{
-  constexpr double lowered = 1e-2, loosest = 1e-6;
-  const double own = map.options.contact.tolerance;
-  return map.keeps_step ? std::max(own, std::min(neglected * lowered * map.kept.moved, loosest)) : own;
-}
-
-/// Whether the period that ends here moved less than its contact was solved for.
-bool contact_is_too_loose(const PeriodMap& map)
-{
-  return map.step.contact.tolerance > std::max(map.options.contact.tolerance, neglected * map.kept.moved);
-}
-
 /// Turns `rate`, which holds x_(N-1), into dPhi/dT. `end`, the state x_N, goes a step on.
 void complete_rate(PeriodMap& map, StepWork& work, State& end, Vec rate)
 {
@@ -92,11 +74,10 @@ void end_at_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate, 
   map.kept = {h, 2 * bend / (h * h * speed), moved};
 }
 
-void integrate_once(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
+void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
 {
   const auto& [structure, interface, equilibrium] = map.sliding;
   set_step(map, rate ? step_for(map, period) : period / map.steps);
-  if (rate) map.step.contact.tolerance = contact_tolerance_for(map);
   State state{copy_of(displacement(start)), copy_of(velocity(start)), 0, map.reactions};
   if (rate) begin_record(map, start);
   const auto after = [&, done = 0](const StepReport& report, const StepWork&) mutable
@@ -119,17 +100,6 @@ void integrate_once(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
   note_joints(map, start);
   complete_rate(map, work, state, rate);
   if (map.keeps_step) end_at_period(map, period, start, end, rate, state.v);
-}
-
-/// Anew and exactly where the period came back much closer to its start than the one before.
-void integrate_period(PeriodMap& map, double period, Vec start, Vec end, Vec rate)
-{
-  const std::vector<double> before = map.reactions;
-  integrate_once(map, period, start, end, rate);
-  if (!rate || !contact_is_too_loose(map)) return;
-  map.reactions = before;
-  map.kept.moved = 0;
-  integrate_once(map, period, start, end, rate);
 }
 
 } // namespace

@@ -55,8 +55,10 @@ std::string stability_text(const Multipliers& multipliers)
   if (multipliers.values.empty())
     return multipliers.stability == Stability::undecided ? ", whether it lasts is undecided"
                                                          : ", whether it lasts was not examined";
-  // of the largest, or of the one that leaves it undecided
-  const std::size_t place = multipliers.stability == Stability::undecided ? deciding_place(multipliers) : 0;
+  std::size_t place = 0; // of the largest, or of the first that leaves it undecided
+  if (multipliers.stability == Stability::undecided)
+    while (place < multipliers.values.size() && multipliers.upper_bound(place) < 1) ++place;
+  place %= multipliers.values.size();
   const double modulus = std::abs(multipliers.values[place]), error = multipliers.errors[place];
   const double bound = largest_upper_bound(multipliers); // closer than the error, which is of both sides
   const bool decided = multipliers.stability == Stability::stable || multipliers.stability == Stability::unstable;
@@ -209,6 +211,21 @@ std::string without_friction(const Report& report)
   return {};
 }
 
+/// Where no mode grows: silence, unless starts lead to something else, or may.
+std::string stable_text(const Report& report)
+{
+  const Attractors& seen = report.attractors;
+  const std::string others =
+      starts_text(report, "motion", [](const ReachedMotion& motion) { return motion.kind == ReachedKind::rest; });
+  std::size_t open = 0;
+  for (const ReachedMotion& motion : seen.motions)
+    if (motion.kind == ReachedKind::unsettled) open += motion.starts.size();
+  if (others.empty() && open > 0)
+    return format("undecided: no mode grows in the band, but %zu of %zu starts still moved after %ld periods", open,
+                  seen.starts.size(), seen.periods);
+  return "silent: no mode grows in the band" + others;
+}
+
 /// Without a cycle.
 std::string linear_text(const Report& report)
 {
@@ -217,11 +234,8 @@ std::string linear_text(const Report& report)
   if (!has_run(report.point.modes.outcome)) return "nothing is known: the modes were not computed";
   if (const std::string text = without_friction(report); !text.empty()) return text;
   if (report.point.modes.unstable_count == 0)
-    return report.point.modes.outcome.kind == OutcomeKind::converged
-               ? "silent: no mode grows in the band" + starts_text(report, "motion",
-                                                                   [](const ReachedMotion& motion)
-                                                                   { return motion.kind == ReachedKind::rest; })
-               : "nothing is known: the modes are incomplete";
+    return report.point.modes.outcome.kind == OutcomeKind::converged ? stable_text(report)
+                                                                     : "nothing is known: the modes are incomplete";
   const ComplexMode& mode = report.point.modes.modes.front();
   if (mode.frequency_hz() == 0)
     return format("the equilibrium diverges without oscillating, by a factor e in %.3g s", 1 / mode.growth_rate());

@@ -135,13 +135,22 @@ void examine(const TangentBundle& bundle, double window, const MotionSeries& ser
   for (const auto& channel : motion.channels) motion.means.push_back(batch_mean(std::span(channel).subspan(first)));
   const double windows_of_period = motion.period / window;
   const auto first_window = static_cast<std::size_t>(static_cast<double>(first) * windows_of_period);
-  motion.exponents = exponents_of(bundle, std::max(first_window, windows / 4), windows_of_period);
+  if (bundle.growth.empty() || bundle.growth.front().size() == windows) // else they are known
+    motion.exponents = exponents_of(bundle, std::max(first_window, windows / 4), windows_of_period);
   motion.verdict = judge_motion(motion.exponents, energies.subspan(first), motion.base);
   const bool cycle = motion.verdict.kind == MotionKind::periodic && motion.base.closes_after == 0;
   if (cycle) motion.base.second = motion.base.explained = 0; // by the exponents: that line is rounding, or dies out
 }
 
 } // namespace
+
+/// Whether exponents are above zero. Bars of 95 % each: 1.4 times as wide they hold for four exponents at once.
+constexpr double together = 1.4;
+
+bool any_grows(const std::vector<MeanValue>& exponents)
+{
+  return std::ranges::any_of(exponents, [](const MeanValue& one) { return one.value > together * one.error; });
+}
 
 MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<const double> energies,
                            const BaseFrequencies& base)
@@ -150,13 +159,9 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
   if (!is_stationary(energies))
     return {MotionKind::undecided, "a motion that still changes and one that wanders slowly", more};
   if (exponents.empty()) return {MotionKind::undecided, "all kinds, without Lyapunov exponents", more};
-  // Bars of 95 % each: 1.4 times as wide they hold for four exponents at once.
-  constexpr double together = 1.4;
-  const auto positive = std::count_if(exponents.begin(), exponents.end(),
-                                      [](const MeanValue& one) { return one.value > together * one.error; });
   const auto zero = std::count_if(exponents.begin(), exponents.end(),
                                   [](const MeanValue& one) { return std::abs(one.value) <= together * one.error; });
-  if (positive > 0) return judge_irregular(energies);
+  if (any_grows(exponents)) return judge_irregular(energies);
   const bool one_frequency = base.second == 0 || base.closes_after > 0;
   // slow motions that die out have exponents within their bars of zero, too; a torus of hardly coupled parts has as
   // steady energies, and the second frequency tells
@@ -178,16 +183,18 @@ ExaminedMotion examine_motion(const Flow& flow, const ObservedMotion& observed, 
   Progress progress(comm_of(displacement(state)), "settled", static_cast<double>(options.periods));
   const auto most = static_cast<std::size_t>(options.periods);
   std::size_t target = std::min<std::size_t>(128, most);
+  bool grows = false; // once an exponent is known to be above zero, means alone are open
   for (;; target = std::min(2 * target, most))
   {
     while (motion.windows < target)
     {
       const double energy = observed.advance(state);
-      follow_period(flow, bundle);
+      if (!grows) follow_period(flow, bundle);
       progress.update(static_cast<double>(++motion.windows), format("energy %.4g", energy));
     }
     examine(bundle, observed.window, observed.series(), motion);
     if (motion.verdict.kind != MotionKind::undecided) return motion;
+    grows = any_grows(motion.exponents) && motion.discarded < motion.periods();
     if (target < most) continue;
     motion.verdict.would_decide += format(" (-settled_periods %zu)", 4 * most);
     return motion;

@@ -307,9 +307,11 @@ std::vector<MeanValue> exponents_of(const TangentBundle& bundle, std::size_t ski
   for (const std::vector<double>& growth : bundle.growth)
   {
     if (growth.size() < skipped + 4) return {};
-    const std::span<const double> counted = std::span(growth).subspan(skipped);
-    const MeanValue mean = batch_mean(counted);
-    const double shear = std::numbers::ln2 / static_cast<double>(counted.size());
+    const std::vector<double> counted(growth.begin() + to_int(skipped), growth.end());
+    const auto length = static_cast<double>(counted.size());
+    constexpr double fewest = 16; // whole periods, within which a motion stretches unevenly
+    const MeanValue mean = batch_mean(means_over(counted, fewest * windows <= length ? std::max(windows, 1.) : 1.));
+    const double shear = std::numbers::ln2 / length;
     exponents.push_back({windows * mean.value, windows * (mean.error + shear)});
   }
   std::stable_sort(exponents.begin(), exponents.end(),

@@ -339,7 +339,7 @@ Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedS
   }
   result.friction_rate_linear = linear / energy;
   const double first = first_event(result);
-  const double limit = result.lift_off_amplitude < infinity ? result.lift_off_amplitude : result.reversal_amplitude;
+  const double limit = limiting_event(result);
   if (first == infinity || first <= 0)
   {
     result.outcome = {OutcomeKind::no_balance, "nothing saturates the interface force", 0, 0};
@@ -368,6 +368,11 @@ Estimate estimate_amplitude(const SlidingEquilibrium& sliding, const LinearisedS
 double first_event(const Estimate& estimate)
 {
   return std::min(estimate.lift_off_amplitude, estimate.reversal_amplitude);
+}
+
+double limiting_event(const Estimate& estimate)
+{
+  return std::isfinite(estimate.lift_off_amplitude) ? estimate.lift_off_amplitude : estimate.reversal_amplitude;
 }
 
 std::optional<State> estimated_motion(const Equilibrium& equilibrium, const ComplexMode& mode, const Estimate& estimate)

@@ -296,7 +296,7 @@ State start_of_motion(const SlidingEquilibrium& sliding, const UnstableModes& un
   const Estimate& estimate = unstable.estimates.front();
   if (settings.start.kind == StartKind::mode)
     return mode_state(sliding.equilibrium, followed,
-                      settings.amplitude > 0 ? settings.amplitude : 0.1 * estimate.lift_off_amplitude, estimate.phase);
+                      settings.amplitude > 0 ? settings.amplitude : 0.1 * limiting_event(estimate), estimate.phase);
   State start = mode_state(sliding.equilibrium, followed, estimate.start_amplitude, estimate.phase);
   for (std::size_t i = 1; i < unstable.modes.size(); ++i)
     if (const auto motion = estimated_motion(sliding.equilibrium, unstable.modes[i], unstable.estimates[i]))

@@ -40,6 +40,9 @@ struct Estimate
 /// [m] First lift-off or reversal of the sliding: below it a motion grows or decays as its mode does; or infinite.
 double first_event(const Estimate& estimate);
 
+/// [m] First lift-off, or reversal where nothing lifts off; or infinite.
+double limiting_event(const Estimate& estimate);
+
 /// Start amplitude over first lift-off, or over reversal where nothing lifts off, where there is no energy balance.
 inline constexpr double lift_off_multiple = 2;
 
