@@ -6,7 +6,7 @@
 /// opens or closes. So the finer mesh has it twice: lambda(h/2), and held with the closed pairs of the scene's mesh.
 /// With d = held - lambda(h) the limit is lambda(h/2) + d/(2^q - 1). The order q is not known: at corners and edges of
 /// contact it is below that of the elements, 2 or 4. Orders from 1 on put the limit between lambda(h/2) and lambda(h/2)
-/// + d; the middle is the corrected value. Its bar is half of |d|, and |lambda(h/2) - held| beside it: the border of
+/// + d; the middle is the corrected value. Its bar is 1.25 |d|/2, and |lambda(h/2) - held| beside it: the border of
 /// the contact falls between nodes as it may, on the finer mesh as on the first. Straight sides of a geometry's round
 /// parts become rounder with the first division, so that they are part of d.
 ///

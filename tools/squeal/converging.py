@@ -20,6 +20,7 @@ from squeal.scene import Scene
 STUDIES = ("transient", "cycle", "branch", "sweep", "response", "robustness", "uncertain", "change", "initial")
 STEPS = 12  # at most
 MARGIN = 0.9  # the first mesh is aimed at the bar asked for, and each later one lower by this
+MORE = 2.5  # times as many elements in a step by sizes, at most: the estimate of a mesh tells little of one much finer
 UNIFORM = 2**(-1 / 3)  # factor on all sizes of a step of the uniform path: twice the elements
 
 
@@ -153,7 +154,10 @@ def by_sizes(work: Converging) -> Callable[[int, Step], Mesh]:
     def next_mesh(number: int, before: Step) -> Mesh:
         found = estimate(Results(before.folder))
         left = {mode: MARGIN**(number - 1) * part for mode, part in left_open(found, work.part).items()}
-        return work.sized(f"sizes_{number}", found, wanted_factors(found, left), "sizes by the estimate")[0]
+        most = MORE * sum(len(block.cells) for block in found.blocks)
+        while elements_foreseen(factors := wanted_factors(found, left)) > most:
+            left = {mode: max(part, part**0.9) for mode, part in left.items()}
+        return work.sized(f"sizes_{number}", found, factors, "sizes by the estimate")[0]
     return next_mesh
 
 

@@ -14,12 +14,12 @@ struct ModeOnFinerMesh
 {
   std::complex<double> lambda, finer, held; // [1/s]; held: the finer one with the closed pairs of the scene's mesh
   double backward_error = 0;                // of the finer ones
-
+  static constexpr double safety = 1.25;    // factor of the bar (Roache, J. Fluids Eng. 116 (1994) 405)
   std::complex<double> corrected() const { return finer + (held - lambda) / 2.; }
   /// The bar of `corrected`: of growth [1/s] in the real part, of angular frequency [rad/s] in the imaginary one.
   std::complex<double> bar() const
   {
-    const std::complex<double> smooth = (held - lambda) / 2., contact = finer - held;
+    const std::complex<double> smooth = safety * (held - lambda) / 2., contact = finer - held;
     return {std::abs(smooth.real()) + std::abs(contact.real()), std::abs(smooth.imag()) + std::abs(contact.imag())};
   }
 
