@@ -280,7 +280,8 @@ bool all_settled(const std::vector<ReachedMotion>& motions, long periods)
 }
 
 /// Adds to the bars of motions what half as many steps a period change, from where each one's first start has ended,
-/// over as many periods.
+/// over as many periods. One step more keeps motions that each take a whole number of steps from agreeing.
+/// One whose periods are alike to rounding takes such a number, and holds half a step.
 void add_step_errors(const Swarm& swarm, long periods, std::vector<ReachedMotion>& motions)
 {
   std::vector<ReachedMotion*> moving;
@@ -294,12 +295,15 @@ void add_step_errors(const Swarm& swarm, long periods, std::vector<ReachedMotion
     ends.push_back(std::move(end));
   }
   if (moving.empty()) return;
-  Swarm coarse = begin(swarm.problem, std::max(swarm.steps_per_period / 2, 1), std::move(ends));
+  Swarm coarse = begin(swarm.problem, swarm.steps_per_period / 2 + 1, std::move(ends));
   integrate(coarse, periods);
   const std::vector<ReachedMotion> others = reached(coarse);
   for (std::size_t k = 0; k < moving.size(); ++k)
   {
     moving[k]->energy.error += std::abs(others[k].energy.value - moving[k]->energy.value);
+    constexpr double rounding = 1e-9;
+    if (const double f = moving[k]->frequency.value; moving[k]->frequency.error < rounding * f)
+      moving[k]->frequency.error += f * f * swarm.step.h / 2;
     moving[k]->frequency.error += std::abs(others[k].frequency.value - moving[k]->frequency.value);
   }
 }

@@ -2,6 +2,7 @@
 
 import pytest
 from conftest import INPUTS
+from models import write_scene
 from test_basin import two_oscillators
 
 SCENE = [INPUTS / "oscillator" / "scene.toml", "--set", "transient.enabled=false", "--set", "cycle.steps_per_period=100"]
@@ -53,3 +54,18 @@ def test_several_unstable_modes_show_each_motion(squeal, tmp_path):
 def test_a_negative_number_of_starts_is_refused(squeal):
     run = squeal(*SCENE, "--set", "cycle.starts=-1", "--dry-run", ranks=1)
     assert run.code == 1 and len(run.messages) == 1 and "cycle.starts=-1" in run.messages[0]
+
+
+def test_bars_of_starts_hold_the_step_of_a_motion_locked_to_its_grid(squeal, tmp_path):
+    """A block on a belt, friction 0.3 and 0.5 at rest: by events it sticks and slips at 0.150203 Hz. Released with a step's begin it
+    takes 68 steps of 64 a period of the mode, and 34 of 32."""
+    at = [0, 0, 0]
+    scene = write_scene(
+        tmp_path, point=[{"name": "block", "at": at, "mass": 1, "free": "x y"}, {"name": "belt", "at": at, "mass": 1, "free": "none"}],
+        spring=[{"from": "block", "to": "ground", "direction": "x", "stiffness": 1.0, "damping": 0.02}],
+        force=[{"on": "block", "vector": [0, -1, 0]}],
+        contact=[{"rotor": "belt", "stator": "block", "normal": [0, 1, 0], "tangents": [[1, 0, 0]], "velocity": [0.2, 0, 0]}],
+        friction={"coefficient": 0.3, "static_coefficient": 0.5}, modes={"band": 1}, cycle={"starts": 8})
+    motion = squeal(scene, ranks=1).report["attractors"]["motions"][0]
+    assert motion["kind"] == "steady"
+    assert abs(motion["frequency_hz"] - 0.150203) <= motion["frequency_error"] < 0.01 * 0.150203

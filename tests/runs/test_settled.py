@@ -249,7 +249,7 @@ def test_events_inside_steps_carry_small_motions_on(squeal, friction, speed, dam
               "spring.1.damping": damping, "spring.3.damping": damping, "spring.2.stiffness": across, "spring.3.stiffness": disc,
               "spring.1.stiffness": along, "point.disc.mass": mass, "cycle.steps_per_period": 0, "cycle.tolerance": 0,
               "transient.enabled": "false"}
-    run = squeal("inputs/oscillator/scene.toml", *(word for key, value in values.items() for word in ("--set", f"{key}={value}")), ranks=1)
+    run = squeal(INPUTS / "oscillator" / "scene.toml", *(word for key, value in values.items() for word in ("--set", f"{key}={value}")), ranks=1)
     found = run.report["cycle"]["multipliers"]
     assert run.code == 0 and found["stability"] == "stable" and found["trivial_error"] < 0.01
     assert abs(found["largest"] - exact) <= found["largest_error"] < 0.01
@@ -289,10 +289,10 @@ def pads_on_discs(folder):
 
 def test_impacts_leave_the_verdict_decided(converged, tmp_path):
     """Beside the cycle motions decay by 0.994 a period, known to 2e-3, and an integrator of its own settles on it from three
-    starts. The shift in time misses 1 by 0.1, as impacts move masses within steps: that is no bar of the others."""
+    starts. Without what events inside steps do the shift in time misses 1 by 0.1."""
     found = converged(pads_on_discs(tmp_path), ranks=1).report["cycle"]["multipliers"]
     largest = found["values"][0]
-    assert found["stability"] == "stable" and largest["error"] < 0.01 < found["trivial_error"]
+    assert found["stability"] == "stable" and max(largest["error"], found["trivial_error"]) < 0.01
     assert abs(math.hypot(largest["real"], largest["imaginary"]) - 0.994) <= largest["error"] + 2e-3
 
 
