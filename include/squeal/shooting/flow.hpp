@@ -37,10 +37,9 @@ struct TimeGrid
 {
   double shift = 0;    // the part of a step by which it is moved
   int finer = 1;       // times as many steps as the flow takes
-  int more = 0;        // steps beyond that
   bool events = false; // with what events inside steps do to the tangent; the period may begin some steps later
 
-  int steps(int of_flow) const { return finer * of_flow + more; }
+  int steps(int of_flow) const { return finer * of_flow; }
 };
 
 /// The motion in a period of a system's offsets: displacements that stay as they are while friction holds them, and
