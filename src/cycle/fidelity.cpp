@@ -69,8 +69,7 @@ struct FineShooting
   CycleProblem& problem;
   CycleOptions options; // without a verdict, which the last cycle alone is given
   double accuracy = 0;
-  bool exact = false;      // steps of the iteration
-  LimitCycle coarser = {}; // the one before the last: its orbit alone
+  bool exact = false; // steps of the iteration
 
   /// Shoots until what further steps would change is below half of the accuracy; where the steps are exact below a
   /// twentieth, unless that stalls: cycles on two grids are compared.
@@ -190,9 +189,6 @@ void refine(FineShooting& shooting, FittedCycle& found)
     if (confirmed && largest(errors) <= accuracy / 2) of_grid = shooting.changes_on_moved_grid(finer);
     errors.frequency += of_grid.frequency;
     errors.energy += of_grid.energy;
-    shooting.coarser.steps_per_period = cycle.steps_per_period;
-    shooting.coarser.theta = cycle.theta;
-    shooting.coarser.orbit = copy_of(cycle.orbit);
     take(std::move(finer), errors, found);
     accurate = largest(errors) <= accuracy / 2;
     if (accurate && confirmed) return;
@@ -213,24 +209,6 @@ void cut_short(FittedCycle& found)
   found.fidelity.reason = format("the run was ended at %d steps a period", found.cycle.steps_per_period);
 }
 
-/// Widens the bars of a whole matrix by what fewer steps change, on the cycle that closes on them: the orbit has an
-/// error of its own, of order 1 where impacts come. A verdict that no motion has shown follows.
-void add_step_errors(const Multipliers& coarser, double ratio, Multipliers& multipliers)
-{
-  if (multipliers.method != MultiplierMethod::whole || coarser.values.size() != multipliers.values.size()) return;
-  const std::vector<std::size_t> places = nearest_places(multipliers.values, coarser.values);
-  bool repels = false;
-  for (std::size_t i = 0; i < places.size(); ++i)
-  {
-    const double size = std::abs(multipliers.values[i]), change = std::abs(std::abs(coarser.values[places[i]]) - size);
-    multipliers.errors[i] = std::max(multipliers.errors[i], change / (ratio - 1));
-    repels = repels || size - multipliers.errors[i] > 1;
-  }
-  if (repels || largest_upper_bound(multipliers) < 1 || !multipliers.seen.empty()) return;
-  multipliers.stability = Stability::undecided;
-  multipliers.would_decide = "the largest multiplier's change with the steps reaches across 1: more steps a period";
-}
-
 /// Takes a converged cycle to twice as many steps a period; where these are still too few, to as many as the errors of
 /// both foretell. Where the accuracy is not reached, the finest cycle stands with its errors, and its reason says so.
 /// Where the run is asked to end meanwhile, the cycle that was found stays.
@@ -238,10 +216,10 @@ void refine_steps(CycleProblem& problem, const CycleOptions& options, FittedCycl
 {
   LimitCycle& cycle = found.cycle;
   const int coarse = cycle.steps_per_period;
-  FineShooting shooting{problem, options, found.fidelity.accuracy,
-                        whole_tangent_is_cheap(2. * dofs_of(cycle.orbit.state))};
   try
   {
+    FineShooting shooting{problem, options, found.fidelity.accuracy,
+                          whole_tangent_is_cheap(2. * dofs_of(cycle.orbit.state))};
     shooting.options.shooting.multipliers = 0;
     shooting.options.shooting.max_periods = cycle.convergence.periods + most_corrections;
     refine(shooting, found);
@@ -259,14 +237,6 @@ void refine_steps(CycleProblem& problem, const CycleOptions& options, FittedCycl
     return;
   Verdict verdict = examine(problem, options, cycle);
   if (verdict.cut_short) return cut_short(found);
-  if (verdict.floquet.multipliers.method == MultiplierMethod::whole)
-  {
-    shooting.options.shooting.multipliers = options.shooting.multipliers;
-    shooting.options.shooting.watched_periods = 0;
-    add_step_errors(examine(problem, shooting.options, shooting.coarser).floquet.multipliers,
-                    static_cast<double>(cycle.steps_per_period) / shooting.coarser.steps_per_period,
-                    verdict.floquet.multipliers);
-  }
   refuse_repelling(verdict, problem.unstable.modes.size() - 1, cycle.outcome);
   if (cycle.outcome.kind != OutcomeKind::converged) cycle.steps_per_period = 2 * coarse; // of the motion that goes on
   cycle.multipliers = std::move(verdict.floquet.multipliers);

@@ -47,13 +47,13 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
   const std::vector<std::size_t> at_later = nearest_places(values, later), at_finer = nearest_places(values, finer);
   for (std::size_t i = 0; i < values.size(); ++i) // largest first
   {
-    constexpr double of_order_2 = 4. / 3, rounding = 1e-9;
+    constexpr double of_order_1 = 2, rounding = 1e-9; // order 1 where contact hits or turns
     if (i == shift) continue;
     const double size = std::abs(values[i]), moved = std::abs(std::abs(later[at_later[i]]) - size),
                  refined = std::abs(std::abs(finer[at_finer[i]]) - size);
     multipliers.values.push_back(values[i]);
     multipliers.errors.push_back(
-        std::max({moved + of_order_2 * refined, moved_by_grid(multipliers, values[i]), rounding}));
+        std::max({of_order_1 * (moved + refined), moved_by_grid(multipliers, values[i]), rounding}));
   }
   if (multipliers.values.empty()) return result;
   decide(multipliers, {true, ""});

@@ -12,8 +12,6 @@ namespace squeal
 namespace
 {
 
-using Kind = StepEvent::Kind;
-
 /// The states of pairs in the steps of an orbit, which goes on from its end to its start.
 class PairsInSteps
 {
@@ -28,7 +26,6 @@ public:
   long steps() const { return static_cast<long>(records_.size()); }
   std::size_t place(long step) const { return static_cast<std::size_t>((step % steps() + steps()) % steps()); }
   ContactStatus status(std::size_t pair, long step) const { return statuses_[place(step)][pair]; }
-  const std::vector<double>& reactions(long step) const { return records_[place(step)].reactions; }
   std::span<const double> sliding(std::size_t pair, long step) const
   {
     return PairView<const double>(records_[place(step)].contact_velocity, interface_.directions).tangential(pair);
@@ -65,7 +62,7 @@ private:
 StepEvent event_at(const Interface& interface, const PairsInSteps& pairs, std::size_t pair, long step)
 {
   constexpr long of_impact = 2; // steps that an impact takes
-  StepEvent event{Kind::impact, pair, step};
+  StepEvent event{pair, step};
   const ContactStatus before = pairs.status(pair, step - 1), now = pairs.status(pair, step);
   if (now == ContactStatus::open || pairs.is_same(pair, step - 1, step) || slip_compliance_of(interface, pair) > 0)
     return event;
@@ -75,44 +72,28 @@ StepEvent event_at(const Interface& interface, const PairsInSteps& pairs, std::s
   if (before == ContactStatus::open)
   {
     if (compliance_of(interface, pair) > 0) return event;
+    event.is_impact = true;
     event.weights[0] = 1;
     event.end = std::max(lasting, step + of_impact);
   }
   else if (before == ContactStatus::slip)
   {
     if (pairs.status(pair, lasting) != ContactStatus::slip || pairs.is_same(pair, step - 1, lasting)) return event;
-    event.kind = Kind::turn;
     std::ranges::copy(pairs.sliding(pair, step - 1), along.begin());
     event.end = std::max(lasting, step + 1);
   }
-  else if (has_two_levels(interface.friction.of(pair)))
-  {
-    event.kind = Kind::release;
-    std::ranges::copy(PairView<const double>(pairs.reactions(step - 1), interface.directions).tangential(pair),
-                      along.begin());
-    event.end = step + 1;
-  }
   const double size = std::sqrt(dot(along, along));
   for (double& weight : along) weight /= std::max(size, 1e-300);
-  if (event.kind != Kind::release) return event;
-  event.weights[0] = interface.friction.of(pair).static_coefficient;
-  for (double& weight : along) weight = -weight;
   return event;
 }
 
 /// c of each column.
 std::vector<double> passing(const Interface& interface, const StepEvent& event, std::span<const TangentColumn> columns)
 {
-  std::vector<std::vector<double>> rows;
   std::vector<Vec> vectors;
-  for (const TangentColumn& column : columns)
-    if (event.kind == Kind::release)
-      rows.push_back(column.reactions);
-    else
-      vectors.push_back(event.kind == Kind::impact ? column.u : column.v);
-  if (!vectors.empty()) rows = relative(interface, vectors);
+  for (const TangentColumn& column : columns) vectors.push_back(event.is_impact ? column.u : column.v);
   std::vector<double> result;
-  for (const std::vector<double>& row : rows)
+  for (const std::vector<double>& row : relative(interface, vectors))
   {
     const PairView<const double> view(row, interface.directions);
     result.push_back(event.weights[0] * view.normal(event.pair) +
@@ -153,14 +134,11 @@ public:
   /// c of the event before `step`.
   double passing_at(const StepEvent& event, long step) const
   {
-    TangentColumn state = column(pairs_.place(step));
-    state.reactions = pairs_.reactions(step - 1);
-    double c = passing(interface_, event, std::span(&state, 1)).front();
-    if (event.kind == Kind::impact) c += interface_.gap[event.pair];
-    if (event.kind == Kind::turn)
-      c -=
-          dot(std::span(event.weights).subspan(1), TangentView(interface_.drive, interface_.directions).of(event.pair));
-    return c;
+    const TangentColumn state = column(pairs_.place(step));
+    const double c = passing(interface_, event, std::span(&state, 1)).front();
+    const TangentView drive(interface_.drive, interface_.directions);
+    return c + (event.is_impact ? interface_.gap[event.pair]
+                                : -dot(std::span(event.weights).subspan(1), drive.of(event.pair)));
   }
 
   /// Sets what `event` is without, by its own steps and the free ones on both sides. Whether it has a place.
@@ -168,9 +146,9 @@ public:
   {
     const double c = passing_at(event, event.first), last = c - passing_at(event, event.first - 1),
                  before = free_before > 1 ? c - last - passing_at(event, event.first - 2) : last,
-                 slope = (3 * last - before) / 2, offset = event.kind == Kind::release ? 0.5 : 0; // of a step's mean
+                 slope = (3 * last - before) / 2;
     if (!(slope < 0)) return false;
-    event.ahead = offset + std::clamp(-c / slope - offset, -1., 2.);
+    event.ahead = std::clamp(-c / slope, -1., 2.);
     event.rate = (slope + event.ahead * (last - before)) / h_;
     event.before = flow(event.first, true, free_before > 1);
     event.after = flow(event.end, false, free_after > 1);

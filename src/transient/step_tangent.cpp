@@ -139,7 +139,7 @@ MatrixXd reactions(const RecordedStep& of, std::span<const TangentColumn> column
 }
 
 /// dv+ of every column from A dv_f in Av, with the contact that `db` starts from; Av becomes A dv+.
-void solve_columns(const RecordedStep& of, std::span<TangentColumn> columns, MatrixXd db, TangentWork& work)
+void solve_columns(const RecordedStep& of, std::span<const TangentColumn> columns, MatrixXd db, TangentWork& work)
 {
   const auto& [step, structure, interface, record, W, room] = of;
   const std::vector<Vec> Av = handles(work.Av);
@@ -148,13 +148,7 @@ void solve_columns(const RecordedStep& of, std::span<TangentColumn> columns, Mat
   std::vector<double> lambda;
   if (interface.pairs > 0)
   {
-    dr = reactions(of, columns, std::move(db), Bv_free);
-    for (std::size_t k = 0; k < columns.size(); ++k)
-    {
-      const auto own = dr.col(static_cast<Index>(k));
-      columns[k].reactions.assign(own.begin(), own.end());
-    }
-    dr *= step.h;
+    dr = step.h * reactions(of, columns, std::move(db), Bv_free);
     for (std::size_t k = 0; k < columns.size(); ++k)
     {
       const double* const impulse = dr.col(static_cast<Index>(k)).data();

@@ -170,9 +170,8 @@ StepWork take_steps(const ThetaStep& step, const Structure& structure, const Int
 /// A change of the state, and its cause besides the change of the start.
 struct TangentColumn
 {
-  Owned<Vec> u, v;                 // du [m], dv [m/s]
-  double friction = 0;             // change of the friction law's coefficient in every step
-  std::vector<double> reactions{}; // [N] change of r+ in the step taken last
+  Owned<Vec> u, v;     // du [m], dv [m/s]
+  double friction = 0; // change of the friction law's coefficient in every step
 };
 
 /// From changes at the start of the recorded steps to those at their end, in place. Collective.
@@ -184,20 +183,14 @@ void advance_tangents(const ThetaStep& step, const Structure& structure, const I
 // A motion beside the recorded one meets an event at another time, and leaves it on another flow. The tangent of the
 // steps lacks that where an event's own step has statuses that the motion after it has not.
 
-/// An impact of a pair, a turn of its sliding, or a release from a friction of rest above that of sliding. What passes
-/// zero there is c: the gap, the velocity along the direction of sliding, or what is left to the friction of rest.
+/// An impact of a pair, or a turn of its sliding. What passes zero there is c: the gap, or the velocity along the
+/// direction of sliding.
 struct StepEvent
 {
-  enum class Kind
-  {
-    impact,
-    turn,
-    release,
-  };
-  Kind kind = Kind::impact;
   std::size_t pair = 0;
-  long first = 0, end = 0;         // its first step, and the one after its last
-  std::vector<double> weights{};   // c of the pair's rows of B u, B v or r
+  long first = 0, end = 0; // its first step, and the one after its last
+  bool is_impact = false;
+  std::vector<double> weights{};   // c of the pair's rows of B u or B v
   double ahead = 0;                // the event's c is c + ahead (c - the one of the step before)
   double rate = 0;                 // of c at the event, a second
   TangentColumn before{}, after{}; // the flow x' at both ends
