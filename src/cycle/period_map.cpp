@@ -1,6 +1,6 @@
 #include "squeal/cycle/period_map.hpp"
-#include "squeal/base/mean.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/base/statistics.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -147,35 +147,30 @@ void record_steps(PeriodMap& map, int steps, State& state, const std::function<v
   take_steps(map.step, map.sliding.structure, map.sliding.interface, state, steps, {map.records, {}, watch});
 }
 
-/// Records the steps and the events inside them, from a state some steps on where an event lies at the start.
-void record_with_events(PeriodMap& map, int steps, State start)
+/// Records the steps and the events inside them, from the first step on that no event lies across.
+void record_with_events(PeriodMap& map, int steps, State state)
 {
-  const auto clear_steps = [&](const StepEvent& event) {
-    return event.end > steps ? event.end - steps + 2 : event.first < 2 ? event.end + 2 : 0;
-  };
-  constexpr int attempts = 4;
-  for (int attempt = 0; attempt < attempts; ++attempt)
+  std::vector<TangentColumn> states;
+  const auto keep = [&] { states.push_back({copy_of(state.u.get()), copy_of(state.v.get())}); };
+  keep();
+  record_steps(map, steps, state, keep);
+  map.events = events_inside_steps(map.step, map.sliding.interface, map.records, states);
+  const auto first_from = [&](const StepEvent& event, long begin) { return (event.first - begin + steps) % steps; };
+  long begin = 0;
+  const auto lies_across = [&](const StepEvent& event)
   {
-    State state = copy_of(start);
-    const Vec u = state.u, v = state.v;
-    MultiVector path_u = columns_of(std::span(&u, 1)), path_v = columns_of(std::span(&v, 1));
-    path_u.entries.conservativeResize(Eigen::NoChange, steps + 1);
-    path_v.entries.conservativeResize(Eigen::NoChange, steps + 1);
-    const auto keep = [&, k = Eigen::Index{0}]() mutable
-    {
-      ++k;
-      path_u.entries.col(k) = columns_of(std::span(&u, 1)).entries;
-      path_v.entries.col(k) = columns_of(std::span(&v, 1)).entries;
-    };
-    record_steps(map, steps, state, keep);
-    map.events = events_inside_steps(map.step, map.sliding.interface, {map.records, path_u, path_v, start.u});
-    long on = 0;
-    for (const StepEvent& event : map.events) on = std::max(on, clear_steps(event));
-    if (on == 0) return;
-    copy_column(path_u, on, start.u);
-    copy_column(path_v, on, start.v);
-    start.reactions = map.records[static_cast<std::size_t>(on - 1)].reactions;
+    const long first = first_from(event, begin);
+    return first < 2 || first + event.end - event.first > steps;
+  };
+  while (begin + 1 < steps && std::ranges::any_of(map.events, lies_across)) ++begin;
+  std::ranges::rotate(map.records, map.records.begin() + begin);
+  for (StepEvent& event : map.events)
+  {
+    const long first = first_from(event, begin);
+    event.end += first - event.first;
+    event.first = first;
   }
+  std::ranges::stable_sort(map.events, {}, &StepEvent::first);
 }
 
 } // namespace

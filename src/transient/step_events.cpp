@@ -1,9 +1,7 @@
 /// Events of contact inside steps (src/README.md, section 4.14).
-#include "squeal/algebra/multivector.hpp"
 #include "squeal/transient/theta_step.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace squeal
@@ -12,75 +10,64 @@ namespace squeal
 namespace
 {
 
-/// The states of pairs in the steps of an orbit, which goes on from its end to its start.
-class PairsInSteps
+/// The steps of an orbit, which goes on from its end to its start.
+struct Path
 {
-public:
-  PairsInSteps(const Interface& interface, std::span<const StepRecord> records)
-      : interface_(interface), records_(records)
-  {
-    for (const StepRecord& record : records)
-      statuses_.push_back(contact_status(interface, record.reactions, record.contact_velocity));
-  }
+  double h;
+  const Interface& interface;
+  std::span<const StepRecord> records;
+  std::span<const TangentColumn> states;
+  std::vector<std::vector<ContactStatus>> statuses{};
 
-  long steps() const { return static_cast<long>(records_.size()); }
-  std::size_t place(long step) const { return static_cast<std::size_t>((step % steps() + steps()) % steps()); }
-  ContactStatus status(std::size_t pair, long step) const { return statuses_[place(step)][pair]; }
+  long steps() const { return static_cast<long>(records.size()); }
+  std::size_t place(long step) const { return static_cast<std::size_t>((step + steps()) % steps()); }
+  ContactStatus status(std::size_t pair, long step) const { return statuses[place(step)][pair]; }
   std::span<const double> sliding(std::size_t pair, long step) const
   {
-    return PairView<const double>(records_[place(step)].contact_velocity, interface_.directions).tangential(pair);
+    return PairView<const double>(records[place(step)].contact_velocity, interface.directions).tangential(pair);
   }
-
-  /// Whether the pair has one status in both steps, and slides alike.
-  bool is_same(std::size_t pair, long a, long b) const
-  {
-    if (status(pair, a) != status(pair, b)) return false;
-    return status(pair, a) != ContactStatus::slip || dot(sliding(pair, a), sliding(pair, b)) > 0;
-  }
-
-  /// The first step, from this one on, of a status that lasts.
-  long lasting(std::size_t pair, long step) const
-  {
-    constexpr long lasts = 3, most = 8; // steps
-    for (const long begin = step; step < begin + most;)
-    {
-      long same = 1;
-      while (same < lasts && is_same(pair, step, step + same)) ++same;
-      if (same == lasts) break;
-      step += same;
-    }
-    return step;
-  }
-
-private:
-  const Interface& interface_;
-  std::span<const StepRecord> records_;
-  std::vector<std::vector<ContactStatus>> statuses_;
 };
 
-/// The event that begins with this step of the pair; `end` is 0 where there is none.
-StepEvent event_at(const Interface& interface, const PairsInSteps& pairs, std::size_t pair, long step)
+/// Whether the pair has one status in both steps, and slides alike.
+bool is_same(const Path& path, std::size_t pair, long a, long b)
 {
+  if (path.status(pair, a) != path.status(pair, b)) return false;
+  return path.status(pair, a) != ContactStatus::slip || dot(path.sliding(pair, a), path.sliding(pair, b)) > 0;
+}
+
+/// The first step, from this one on, of a status that lasts.
+long lasting(const Path& path, std::size_t pair, long step)
+{
+  constexpr long most = 8; // steps
+  const long end = step + most;
+  while (step < end && !(is_same(path, pair, step, step + 1) && is_same(path, pair, step, step + 2))) ++step;
+  return step;
+}
+
+/// The event that begins with this step of the pair; `end` is 0 where there is none.
+StepEvent event_at(const Path& path, std::size_t pair, long step)
+{
+  const Interface& interface = path.interface;
   constexpr long of_impact = 2; // steps that an impact takes
   StepEvent event{pair, step};
-  const ContactStatus before = pairs.status(pair, step - 1), now = pairs.status(pair, step);
-  if (now == ContactStatus::open || pairs.is_same(pair, step - 1, step) || slip_compliance_of(interface, pair) > 0)
+  const ContactStatus before = path.status(pair, step - 1), now = path.status(pair, step);
+  if (now == ContactStatus::open || is_same(path, pair, step - 1, step) || slip_compliance_of(interface, pair) > 0)
     return event;
   event.weights.assign(1 + static_cast<std::size_t>(interface.directions), 0);
   const std::span<double> along = std::span(event.weights).subspan(1);
-  const long lasting = pairs.lasting(pair, step);
+  const long last = lasting(path, pair, step);
   if (before == ContactStatus::open)
   {
     if (compliance_of(interface, pair) > 0) return event;
     event.is_impact = true;
     event.weights[0] = 1;
-    event.end = std::max(lasting, step + of_impact);
+    event.end = std::max(last, step + of_impact);
   }
   else if (before == ContactStatus::slip)
   {
-    if (pairs.status(pair, lasting) != ContactStatus::slip || pairs.is_same(pair, step - 1, lasting)) return event;
-    std::ranges::copy(pairs.sliding(pair, step - 1), along.begin());
-    event.end = std::max(lasting, step + 1);
+    if (path.status(pair, last) != ContactStatus::slip || is_same(path, pair, step - 1, last)) return event;
+    std::ranges::copy(path.sliding(pair, step - 1), along.begin());
+    event.end = std::max(last, step + 1);
   }
   const double size = std::sqrt(dot(along, along));
   for (double& weight : along) weight /= std::max(size, 1e-300);
@@ -109,100 +96,66 @@ void add(double a, const TangentColumn& x, TangentColumn& y)
   check(VecAXPY(y.v, a, x.v));
 }
 
-/// The orbit's states and its flow.
-class Path
+/// The flow at the start of a step, by the step after it, or before it, and where there are two by both.
+TangentColumn flow(const Path& path, long step, bool before, bool has_two)
 {
-public:
-  Path(const ThetaStep& step, const Interface& interface, const RecordedOrbit& orbit, const PairsInSteps& pairs)
-      : h_(step.h), interface_(interface), orbit_(orbit), pairs_(pairs)
+  TangentColumn flow{zeros_like(path.states[0].u), zeros_like(path.states[0].v)};
+  const auto add_step = [&](double part, long of)
   {
-  }
+    add(part / path.h, path.states[path.place(of) + 1], flow);
+    add(-part / path.h, path.states[path.place(of)], flow);
+  };
+  add_step(has_two ? 1.5 : 1, before ? step - 1 : step);
+  if (has_two) add_step(-0.5, before ? step - 2 : step + 1);
+  return flow;
+}
 
-  /// The flow at the end of `step` - 1 or the start of `step`, from one step on that side of it or, where there are
-  /// two, to second order.
-  TangentColumn flow(long step, bool ends_there, bool has_two) const
-  {
-    TangentColumn flow = difference(ends_there ? step - 1 : step);
-    if (!has_two) return flow;
-    const TangentColumn beyond = difference(ends_there ? step - 2 : step + 1);
-    add(-1. / 3, beyond, flow);
-    check(VecScale(flow.u, 1.5));
-    check(VecScale(flow.v, 1.5));
-    return flow;
-  }
+/// c of the event before `step`.
+double passing_at(const Path& path, const StepEvent& event, long step)
+{
+  const TangentView drive(path.interface.drive, path.interface.directions);
+  const double still = event.is_impact ? path.interface.gap[event.pair]
+                                       : -dot(std::span(event.weights).subspan(1), drive.of(event.pair));
+  return still + passing(path.interface, event, path.states.subspan(path.place(step), 1)).front();
+}
 
-  /// c of the event before `step`.
-  double passing_at(const StepEvent& event, long step) const
-  {
-    const TangentColumn state = column(pairs_.place(step));
-    const double c = passing(interface_, event, std::span(&state, 1)).front();
-    const TangentView drive(interface_.drive, interface_.directions);
-    return c + (event.is_impact ? interface_.gap[event.pair]
-                                : -dot(std::span(event.weights).subspan(1), drive.of(event.pair)));
-  }
-
-  /// Sets what `event` is without, by its own steps and the free ones on both sides. Whether it has a place.
-  bool complete(StepEvent& event, long free_before, long free_after) const
-  {
-    const double c = passing_at(event, event.first), last = c - passing_at(event, event.first - 1),
-                 before = free_before > 1 ? c - last - passing_at(event, event.first - 2) : last,
-                 slope = (3 * last - before) / 2;
-    if (!(slope < 0)) return false;
-    event.ahead = std::clamp(-c / slope, -1., 2.);
-    event.rate = (slope + event.ahead * (last - before)) / h_;
-    event.before = flow(event.first, true, free_before > 1);
-    event.after = flow(event.end, false, free_after > 1);
-    return event.rate < 0;
-  }
-
-private:
-  TangentColumn column(std::size_t place) const
-  {
-    TangentColumn column{copy_of(orbit_.pattern), copy_of(orbit_.pattern)};
-    copy_column(orbit_.u, static_cast<Eigen::Index>(place), column.u);
-    copy_column(orbit_.v, static_cast<Eigen::Index>(place), column.v);
-    return column;
-  }
-
-  TangentColumn difference(long step) const
-  {
-    TangentColumn next = column(pairs_.place(step) + 1);
-    add(-1, column(pairs_.place(step)), next);
-    check(VecScale(next.u, 1 / h_));
-    check(VecScale(next.v, 1 / h_));
-    return next;
-  }
-
-  double h_;
-  const Interface& interface_;
-  const RecordedOrbit& orbit_;
-  const PairsInSteps& pairs_;
-};
+/// Sets what `event` is without, by its own steps and the free ones on both sides. Whether it has a place.
+bool complete(const Path& path, long free_before, long free_after, StepEvent& event)
+{
+  const double c = passing_at(path, event, event.first), last = c - passing_at(path, event, event.first - 1),
+               before = free_before > 1 ? c - last - passing_at(path, event, event.first - 2) : last,
+               slope = (3 * last - before) / 2;
+  if (!(slope < 0)) return false;
+  event.ahead = std::clamp(-c / slope, -1., 2.);
+  event.rate = (slope + event.ahead * (last - before)) / path.h;
+  event.before = flow(path, event.first, true, free_before > 1);
+  event.after = flow(path, event.end, false, free_after > 1);
+  return event.rate < 0;
+}
 
 } // namespace
 
 std::vector<StepEvent> events_inside_steps(const ThetaStep& step, const Interface& interface,
-                                           const RecordedOrbit& orbit)
+                                           std::span<const StepRecord> records, std::span<const TangentColumn> states)
 {
-  const PairsInSteps pairs(interface, orbit.records);
+  Path path{step.h, interface, records, states};
+  for (const StepRecord& record : records)
+    path.statuses.push_back(contact_status(interface, record.reactions, record.contact_velocity));
   std::vector<StepEvent> found, result;
   for (std::size_t pair = 0; pair < interface.gap.size(); ++pair)
-    for (long k = 0; k < pairs.steps(); ++k)
-    {
-      StepEvent event = event_at(interface, pairs, pair, k);
-      if (event.end == 0) continue;
-      k = event.end - 1;
-      found.push_back(std::move(event));
-    }
+    for (long k = 0; k < path.steps(); ++k)
+      if (StepEvent event = event_at(path, pair, k); event.end > 0)
+      {
+        k = event.end - 1;
+        found.push_back(std::move(event));
+      }
   std::ranges::stable_sort(found, {}, &StepEvent::first);
-  const Path path(step, interface, orbit, pairs);
   for (std::size_t i = 0; i < found.size(); ++i)
   {
     const StepEvent &previous = found[(i + found.size() - 1) % found.size()], &next = found[(i + 1) % found.size()];
-    StepEvent& event = found[i];
-    const long before = event.first - previous.end + (i == 0 ? pairs.steps() : 0),
-               after = next.first - event.end + (i + 1 == found.size() ? pairs.steps() : 0);
-    if (before > 0 && after > 0 && path.complete(event, before, after)) result.push_back(std::move(event));
+    const long before = found[i].first - previous.end + (i == 0 ? path.steps() : 0),
+               after = next.first - found[i].end + (i + 1 == found.size() ? path.steps() : 0);
+    if (before > 0 && after > 0 && complete(path, before, after, found[i])) result.push_back(std::move(found[i]));
   }
   return result;
 }

@@ -1,7 +1,6 @@
 #pragma once
 /// How steps are made, of the transient and of the cycle.
 #include "squeal/algebra/bordered_factor.hpp"
-#include "squeal/algebra/multivector.hpp"
 #include "squeal/algebra/sparse_matrices.hpp"
 #include "squeal/base/petsc.hpp"
 #include "squeal/contact/contact_operator.hpp"
@@ -196,17 +195,10 @@ struct StepEvent
   TangentColumn before{}, after{}; // the flow x' at both ends
 };
 
-/// The steps of a closed orbit.
-struct RecordedOrbit
-{
-  std::span<const StepRecord> records;
-  const MultiVector &u, &v; // the states before each step, and the last one
-  Vec pattern;              // of either
-};
-
-/// The events of the orbit in their order, without those that come too close to another one. Collective.
+/// The events of a closed orbit in their order, without those that come too close to another one. `states`: before each
+/// step, and the last one; from there the orbit goes on at its start. Collective.
 std::vector<StepEvent> events_inside_steps(const ThetaStep& step, const Interface& interface,
-                                           const RecordedOrbit& orbit);
+                                           std::span<const StepRecord> records, std::span<const TangentColumn> states);
 
 /// As the other one, with what events of these records do. Those at the very start or end are left out. Collective.
 void advance_tangents(const ThetaStep& step, const Structure& structure, const Interface& interface,
