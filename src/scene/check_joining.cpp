@@ -308,7 +308,7 @@ std::vector<std::string> doubts_about(const Scene& scene, double length, double 
   const auto slides_smoothly = [](const Contact& contact) { return !is_undriven(contact) && !contact.friction; };
   if (std::max(scene.friction.coefficient, scene.friction.static_coefficient) == 0 && !scene.sweep &&
       std::ranges::any_of(scene.contacts, slides_smoothly))
-    doubts.push_back("contacts slide and nothing gives them friction, so it is 0: give [friction] coefficient");
+    doubts.push_back("contacts slide without friction: [friction] coefficient is 0");
   if (length > 0) doubt_contacts(scene, length, doubts);
   if (scene.cycle.enabled && scene.fidelity == CycleModel::reduced && scene.cycle.tolerance > 0 && !scene.branch)
     doubts.push_back("cycle.tolerance is for the full model's shooting: with fidelity = \"reduced\" nothing uses it, "

@@ -26,7 +26,8 @@ toml::table parse_file(const std::filesystem::path& file)
   {
     const auto& begin = error.source().begin;
     throw Error(file.string() + ", line " + std::to_string(begin.line) + ", column " + std::to_string(begin.column) +
-                ": " + text_of(error));
+                ": " + text_of(error) +
+                (text_of(error).find("utf-8") == std::string::npos ? "" : ": save the file as UTF-8"));
   }
 }
 

@@ -60,6 +60,11 @@ def point_scene(old, new):
     return write
 
 
+def latin_1(folder):
+    (folder / "scene.toml").write_bytes(("# gr\u00fc\u00df\n" + OSCILLATOR).encode("latin-1"))
+    return folder / "scene.toml"
+
+
 def block_scene(old, new, geo_old="", geo_new="", arguments=()):
     def write(folder):
         assert old in BLOCKS and geo_old in BLOCKS_GEO
@@ -154,6 +159,7 @@ CASES = {
                      ["-settled_exponents", "-1"]),
     "negative free periods": (lambda folder: [*point_scene("[cycle]\n", "[cycle]\n")(folder), "-cycle_free_periods", "-3"],
                               ["-cycle_free_periods", "-3"]),
+    "latin-1": (lambda folder: [latin_1(folder)], ["scene.toml, line 1", "save the file as UTF-8"]),
     "broken TOML": (point_scene("mass = 1\n", "mass = = 1\n"), ["line", "scene.toml"]),
     "unknown key": (point_scene("stiffness = 1.0", "stifness = 1.0"), ["stifness", "stiffness"]),
     "negative mass": (point_scene("mass = 1\n", "mass = -1\n"), ["mass", "-1"]),

@@ -1,5 +1,6 @@
 """The first minutes of a user: a short table, named numbers, rotors, design points, and mistakes that are caught."""
 
+import csv
 import json
 import re
 import subprocess
@@ -93,6 +94,36 @@ def test_a_number_is_random_and_leads_a_branch(converged, tmp_path):
     assert by_key["robustness"]["any"]["probability"] == by_name["robustness"]["any"]["probability"]
     assert [point["period"] for point in by_name["branch"]["points"]] == pytest.approx(
         [point["period"] for point in by_key["branch"]["points"]], rel=1e-6)
+
+
+def test_a_number_of_two_keys_leads_a_branch_and_samples_as_both_by_hand(converged, tmp_path):
+    """The damping of two springs: ends of the branch and samples are single runs with both values given."""
+    text = (INPUTS / "oscillator" / "scene.toml").read_text().replace("damping = 0.02", 'damping = "loss"', 2) + "\n[numbers]\nloss = 0.02\n"
+    assert text.count('"loss"') == 2
+    (tmp_path / "scene.toml").write_text(text)
+    cycle = ["--set", "transient.enabled=false", "--set", "cycle.steps_per_period=200", "--set", "fidelity=full"]
+    random = ["--set", "robustness.samples=12", "--set", "uncertain=[{key='numbers.loss', distribution='uniform', from=0.02, to=0.4}]"]
+    along = ["--set", "branch.key=numbers.loss", "--set", "branch.from=0.015", "--set", "branch.to=0.03", "--set", "branch.points=3"]
+    run = converged(tmp_path, *cycle, *random, *along, ranks=1)
+
+    def by_hand(value):
+        both = [word for i in (0, 1) for word in ("--set", f"spring.{i}.damping={value}")]
+        return converged(INPUTS / "oscillator", *cycle, *both, "--set", f"cycle.enabled={str(value < 0.04).lower()}", ranks=1).report
+
+    points = run.report["branch"]["points"]
+    assert [points[0]["parameter"], points[-1]["parameter"]] == [0.015, 0.03]
+    for point in (points[0], points[-1]):
+        alone = by_hand(point["parameter"])["cycle"]
+        assert point["period"] == pytest.approx(alone["period"], rel=5e-6)
+        assert point["mean_fluctuating_energy"] == pytest.approx(alone["mean_fluctuating_energy"], rel=1e-3)
+    with open(run.output / "robustness.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    counts = [by_hand(float(row["numbers.loss"]))["modes"] for row in rows]
+    assert [int(row["unstable_modes"]) for row in rows] == [modes["unstable_count"] for modes in counts]
+    assert {modes["unstable_count"] for modes in counts} == {0, 1}
+    for row, modes in zip(rows, counts, strict=True):
+        if modes["unstable_count"]:
+            assert float(row["growth_rate"]) == pytest.approx(max(mode["growth_rate"] for mode in modes["modes"]), rel=1e-6)
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

@@ -53,7 +53,7 @@ def test_sliding_without_friction_is_warned_of(converged, tmp_path, drive):
         text = "".join(line for line in text.splitlines(keepends=True) if not line.startswith("velocity"))
     assert law and "coefficient" not in text.replace("#", "")
     (tmp_path / "scene.toml").write_text(text)
-    said = "contacts slide and nothing gives them friction, so it is 0: give [friction] coefficient"
+    said = "contacts slide without friction: [friction] coefficient is 0"
     dry = [tmp_path / "scene.toml", "--dry-run", "--set", drive]
     assert said in converged(*dry, ranks=1).printed
     for given in ("friction.coefficient=0.1", "contact.0.friction=0"):
