@@ -110,23 +110,6 @@ struct FineShooting
     cycle.convergence = std::move(log.convergence);
     return !(return_residual(around, free) <= std::max(first, beside));
   }
-
-  /// The changes of a cycle on a grid of time that begins half a step later; none where no cycle is found there. Adds
-  /// its periods.
-  RelativeChange changes_on_moved_grid(LimitCycle& cycle)
-  {
-    PeriodMap map{problem.sliding, problem.step, cycle.steps_per_period, cycle.theta};
-    State later{copy_of(displacement(cycle.orbit.state)), copy_of(velocity(cycle.orbit.state)), 0,
-                cycle.measured.start.reactions};
-    set_period(map, cycle.orbit.period);
-    move_by_part(map, 0.5, later);
-    LimitCycle moved =
-        cycle_near(state_of(later.u, later.v), cycle.orbit.period, cycle.steps_per_period, cycle.convergence);
-    cycle.convergence = std::move(moved.convergence);
-    if (moved.outcome.kind != OutcomeKind::converged) return {};
-    return {std::abs(moved.orbit.period / cycle.orbit.period - 1),
-            std::abs(moved.measured.mean_fluctuating_energy / cycle.measured.mean_fluctuating_energy - 1)};
-  }
 };
 
 /// The cycle as one that was not found, since only its own steps know it. The motion goes on at twice as many steps
@@ -185,10 +168,7 @@ void refine(FineShooting& shooting, FittedCycle& found)
     }
     cycles.push_back(at_steps(finer));
     const bool confirmed = accurate || !shooting.exact;
-    RelativeChange errors = step_errors_of(cycles), of_grid; // of the place of contact's events in their steps
-    if (confirmed && largest(errors) <= accuracy / 2) of_grid = shooting.changes_on_moved_grid(finer);
-    errors.frequency += of_grid.frequency;
-    errors.energy += of_grid.energy;
+    const RelativeChange errors = step_errors_of(cycles);
     take(std::move(finer), errors, found);
     accurate = largest(errors) <= accuracy / 2;
     if (accurate && confirmed) return;
