@@ -40,20 +40,13 @@ struct SessionOption
 constexpr std::array session_options = {
     SessionOption{"log_view", Value::viewer, "[:FILE[:FORMAT]]  where the time went, one stage per step of the chain"},
     SessionOption{"log_view_memory", Value::flag, "  adds memory to -log_view"},
-    SessionOption{"log_all", Value::flag, "  keeps every event"},
     SessionOption{"log_trace", Value::file, "[FILE]  writes every event as it happens"},
-    SessionOption{"log_exclude", Value::text, "CLASSES  leaves events out"},
     SessionOption{"info", Value::file, "[FILE[:CLASSES]]  PETSc's own messages"},
     SessionOption{"history", Value::file, "[FILE]  keeps what PETSc prints"},
     SessionOption{"options_left", Value::flag, "  lists options that were not used"},
     SessionOption{"options_view", Value::flag, "  lists options"},
-    SessionOption{"malloc", Value::flag, "  PETSc's own allocator"},
     SessionOption{"malloc_debug", Value::flag, "  checks memory"},
-    SessionOption{"malloc_dump", Value::flag, "  lists memory that was not freed"},
-    SessionOption{"malloc_view", Value::file, "[FILE]  lists all memory"},
     SessionOption{"memory_view", Value::flag, "  memory at the end"},
-    SessionOption{"no_signal_handler", Value::flag, "  leaves signals to the system"},
-    SessionOption{"get_total_flops", Value::flag, "  counts operations"},
     SessionOption{"citations", Value::file, "[FILE]  what to cite of PETSc"},
 };
 

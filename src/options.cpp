@@ -49,9 +49,7 @@ SceneKeys options_of(ProgramOptions& options)
       {"-transient_contact_solver", choice_of(contact.solver), "word",
        "block Gauss-Seidel, or the projection fixed point (fixed_point)"},
       {"-transient_contact_tolerance", &contact.tolerance, "-",
-       "largest natural map of a pair over the largest reaction; dear periods of shooting that are still far from the "
-       "cycle take up to 1e-6",
-       Rule::positive},
+       "largest natural map of a pair over the largest reaction", Rule::positive},
       {"-transient_contact_rho", &contact.rho, "-",
        "step of the fixed point over 1/lambda_max(W); 0: chosen by the program", Rule::below_two},
       {"-cycle_samples", &options.cycle.samples, "-", "number of displacements over the last period in fields.h5",

@@ -103,12 +103,6 @@ namespace
 using Eigen::MatrixXcd;
 using Eigen::VectorXcd;
 
-enum class Vectors
-{
-  right,
-  both
-};
-
 /// Eigenvalues mu of a matrix with their vectors as columns. Left ones u obey u^H A = mu u^H.
 struct Eigenvectors
 {
@@ -136,12 +130,6 @@ MatrixXcd complex_columns(const VectorXcd& mu, const MatrixXd& packed)
   return columns;
 }
 
-/// The letter that LAPACK's geev takes for left vectors, and their number.
-std::pair<char, Index> left_wanted(Vectors which, Index size)
-{
-  return which == Vectors::both ? std::pair('V', size) : std::pair('N', Index{0});
-}
-
 void need_convergence(int info)
 {
   if (info != 0) throw Error("the QR algorithm did not converge on a dense eigenproblem");
@@ -151,11 +139,11 @@ void need_convergence(int info)
 Eigenvectors eigenvectors(MatrixXd A, Vectors which)
 {
   const int size = to_int(A.rows());
-  const auto [wants_left, columns] = left_wanted(which, size);
+  const Index columns = which == Vectors::both ? size : 0;
   VectorXd re(size), im(size);
   MatrixXd left(size, columns), right(size, size);
-  need_convergence(LAPACKE_dgeev(LAPACK_COL_MAJOR, wants_left, 'V', size, A.data(), size, re.data(), im.data(),
-                                 left.data(), size, right.data(), size));
+  need_convergence(LAPACKE_dgeev(LAPACK_COL_MAJOR, which == Vectors::both ? 'V' : 'N', 'V', size, A.data(), size,
+                                 re.data(), im.data(), left.data(), size, right.data(), size));
   const VectorXcd mu = re.cast<Complex>() + Complex(0, 1) * im;
   return {mu, complex_columns(mu, left), complex_columns(mu, right)};
 }
@@ -163,10 +151,9 @@ Eigenvectors eigenvectors(MatrixXd A, Vectors which)
 Eigenvectors eigenvectors(MatrixXcd A, Vectors which)
 {
   const int size = to_int(A.rows());
-  const auto [wants_left, columns] = left_wanted(which, size);
-  Eigenvectors all{VectorXcd(size), MatrixXcd(size, columns), MatrixXcd(size, size)};
-  need_convergence(LAPACKE_zgeev(LAPACK_COL_MAJOR, wants_left, 'V', size, entries_of(A), size, entries_of(all.mu),
-                                 entries_of(all.left), size, entries_of(all.right), size));
+  Eigenvectors all{VectorXcd(size), MatrixXcd(size, which == Vectors::both ? size : 0), MatrixXcd(size, size)};
+  need_convergence(LAPACKE_zgeev(LAPACK_COL_MAJOR, which == Vectors::both ? 'V' : 'N', 'V', size, entries_of(A), size,
+                                 entries_of(all.mu), entries_of(all.left), size, entries_of(all.right), size));
   return all;
 }
 
@@ -189,10 +176,10 @@ template <class Matrix> Eigen::PartialPivLU<Matrix> regular_factor(const Matrix&
 /// With lambda = omega nu, nu = shift + 1/mu and Q = Q(shift) of the scaled matrices, Q mu^2 + (C + 2 shift M) mu + M
 /// is singular. Its companion matrix is [-Q^-1 (C + 2 shift M), -Q^-1 M; I, 0] on (mu y, y). Left vectors of the
 /// quadratic problem are Q^-T conj(a) by those (a, b) of the companion matrix.
-template <class Matrix> std::vector<TwoSidedPair> solve_companion(const Matrix& M, const Matrix& C, const Matrix& K,
-                                                                  Vectors which, double limit)
+template <class Matrix> std::vector<DenseEigenpair> solve_companion(const Matrix& M, const Matrix& C, const Matrix& K,
+                                                                    Vectors which, double limit)
 {
-  std::vector<TwoSidedPair> result;
+  std::vector<DenseEigenpair> result;
   const Index n = K.rows();
   const double stiffness = norm_1(K), mass = norm_1(M);
   if (mass == 0 || stiffness == 0) return result;
@@ -221,7 +208,7 @@ template <class Matrix> std::vector<TwoSidedPair> solve_companion(const Matrix& 
               .solve(left(Eigen::seqN(0, n), chosen).conjugate());
   for (Index place = 0; const Index j : chosen)
   {
-    TwoSidedPair& pair = result.emplace_back();
+    DenseEigenpair& pair = result.emplace_back();
     pair.lambda = omega * (shift + 1.0 / mu(j));
     // of mu y and y the one of larger entries
     pair.right = right.col(j).segment(std::abs(mu(j)) > 1 ? 0 : n, n).normalized();
@@ -230,61 +217,39 @@ template <class Matrix> std::vector<TwoSidedPair> solve_companion(const Matrix& 
   return result;
 }
 
-std::vector<DenseEigenpair> right_pairs(std::vector<TwoSidedPair> pairs)
+} // namespace
+
+Eigen::MatrixXcd vectors_of(std::span<const DenseEigenpair> pairs, Eigen::VectorXcd DenseEigenpair::*side)
 {
-  std::vector<DenseEigenpair> result;
-  for (TwoSidedPair& pair : pairs) result.push_back({pair.lambda, std::move(pair.right)});
-  return result;
+  if (pairs.empty()) return {};
+  Eigen::MatrixXcd vectors((pairs.front().*side).size(), static_cast<Index>(pairs.size()));
+  for (Index column = 0; const DenseEigenpair& pair : pairs) vectors.col(column++) = pair.*side;
+  return vectors;
 }
 
-/// Gives every rank the pairs of rank 0, whose vectors have the names `vectors` and `rows` entries.
-template <class Pair> void share_pairs(MPI_Comm comm, std::vector<Pair>& pairs, Index rows,
-                                       std::initializer_list<Eigen::VectorXcd Pair::*> vectors)
+void share(MPI_Comm comm, std::vector<DenseEigenpair>& pairs, Index rows)
 {
-  int count = to_int(pairs.size());
-  MPI_Bcast(&count, 1, MPI_INT, 0, comm);
-  pairs.resize(static_cast<std::size_t>(count));
-  for (Pair& pair : pairs)
+  int counts[2] = {to_int(pairs.size()), !pairs.empty() && pairs.front().left.size() > 0};
+  MPI_Bcast(counts, 2, MPI_INT, 0, comm);
+  pairs.resize(static_cast<std::size_t>(counts[0]));
+  for (DenseEigenpair& pair : pairs)
   {
     MPI_Bcast(&pair.lambda, 1, MPI_CXX_DOUBLE_COMPLEX, 0, comm);
-    for (const auto member : vectors)
+    for (Eigen::VectorXcd* vector : {&pair.right, &pair.left})
     {
-      (pair.*member).resize(rows);
-      MPI_Bcast((pair.*member).data(), to_int(rows), MPI_CXX_DOUBLE_COMPLEX, 0, comm);
+      vector->resize(vector == &pair.right || counts[1] ? rows : 0);
+      MPI_Bcast(vector->data(), to_int(vector->size()), MPI_CXX_DOUBLE_COMPLEX, 0, comm);
     }
   }
 }
 
-} // namespace
-
-Eigen::MatrixXcd vectors_of(std::span<const TwoSidedPair> pairs, Eigen::VectorXcd TwoSidedPair::*side)
-{
-  if (pairs.empty()) return {};
-  Eigen::MatrixXcd vectors((pairs.front().*side).size(), static_cast<Index>(pairs.size()));
-  for (Index column = 0; const TwoSidedPair& pair : pairs) vectors.col(column++) = pair.*side;
-  return vectors;
-}
-
-void share(MPI_Comm comm, std::vector<TwoSidedPair>& pairs, Index rows)
-{
-  share_pairs(comm, pairs, rows, {&TwoSidedPair::right, &TwoSidedPair::left});
-}
-
-template <class Matrix> std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm comm, const Matrix& M,
-                                                                         const Matrix& C, const Matrix& K, double limit)
-{
-  std::vector<TwoSidedPair> pairs;
-  on_rank_zero(comm, [&] { pairs = solve_companion(M, C, K, Vectors::both, limit); });
-  share(comm, pairs, K.rows());
-  return pairs;
-}
-
 template <class Matrix> std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Matrix& M,
-                                                                                 const Matrix& C, const Matrix& K)
+                                                                                 const Matrix& C, const Matrix& K,
+                                                                                 Vectors which, double limit)
 {
   std::vector<DenseEigenpair> pairs;
-  on_rank_zero(comm, [&] { pairs = right_pairs(solve_companion(M, C, K, Vectors::right, HUGE_VAL)); });
-  share_pairs(comm, pairs, K.rows(), {&DenseEigenpair::y});
+  on_rank_zero(comm, [&] { pairs = solve_companion(M, C, K, which, limit); });
+  share(comm, pairs, K.rows());
   return pairs;
 }
 
@@ -342,7 +307,7 @@ Eigen::MatrixXd real_columns(const std::vector<DenseEigenpair>& pairs, Eigen::In
   for (Eigen::Index i = 0; i < result.cols(); ++i)
   {
     const DenseEigenpair& pair = pairs[static_cast<std::size_t>(i)];
-    result.col(i) = pair.lambda.imag() < 0 ? Eigen::VectorXd(-pair.y.imag()) : Eigen::VectorXd(pair.y.real());
+    result.col(i) = pair.lambda.imag() < 0 ? Eigen::VectorXd(-pair.right.imag()) : Eigen::VectorXd(pair.right.real());
   }
   return result;
 }
@@ -382,13 +347,9 @@ std::vector<std::size_t> nearest_places(const std::vector<std::complex<double>>&
   return places;
 }
 
-template std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm, const MatrixXd&, const MatrixXd&, const MatrixXd&,
-                                                          double);
 template std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm, const MatrixXd&, const MatrixXd&,
-                                                                  const MatrixXd&);
-template std::vector<TwoSidedPair> solve_two_sided_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&,
-                                                          const MatrixXcd&, double);
+                                                                  const MatrixXd&, Vectors, double);
 template std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm, const MatrixXcd&, const MatrixXcd&,
-                                                                  const MatrixXcd&);
+                                                                  const MatrixXcd&, Vectors, double);
 
 } // namespace squeal

@@ -4,7 +4,7 @@
 #include "squeal/algebra/panel.hpp"
 #include "squeal/algebra/sparse_matrices.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/base/random.hpp"
+#include "squeal/base/statistics.hpp"
 
 #include <algorithm>
 

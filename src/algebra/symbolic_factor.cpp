@@ -1,8 +1,8 @@
 #include "symbolic_factor.hpp"
 
 #include "squeal/algebra/panel.hpp"
-#include "squeal/base/random.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/base/statistics.hpp"
 
 #include <algorithm>
 #include <metis.h>

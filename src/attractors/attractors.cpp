@@ -1,8 +1,8 @@
 #include "squeal/attractors/attractors.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/base/progress.hpp"
-#include "squeal/base/random.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/base/statistics.hpp"
 #include "squeal/transient/theta_step.hpp"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 #include "squeal/equilibrium/linearised_sliding.hpp"
 
-#include "squeal/algebra/quadratic_residual.hpp"
+#include "squeal/algebra/sparse_matrices.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,6 @@
 #include "squeal/mesh/contact_pairs.hpp"
 #include "face_overlap.hpp"
 #include "squeal/base/error.hpp"
-#include "squeal/mesh/frames.hpp"
 #include "squeal/mesh/row_motions.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 

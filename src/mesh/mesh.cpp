@@ -7,7 +7,6 @@
 
 #include "squeal/base/error.hpp"
 #include "squeal/base/packed.hpp"
-#include "squeal/mesh/frames.hpp"
 #include "squeal/mesh/mesh_file.hpp"
 #include "squeal/mesh/row_motions.hpp"
 #include "squeal/mesh/shape_functions.hpp"

@@ -64,8 +64,8 @@ bool extend(Subspace& space, MultiVector X)
 /// f_term y of each pair: the real parts of all, then the imaginary parts.
 MatrixXd coefficients(Pairs pairs, std::size_t term)
 {
-  Eigen::MatrixXcd columns(pairs.front().y.size(), static_cast<Index>(pairs.size()));
-  for (Index k = 0; const DenseEigenpair& pair : pairs) columns.col(k++) = loss_factors(pair.lambda)[term] * pair.y;
+  Eigen::MatrixXcd columns(pairs.front().right.size(), static_cast<Index>(pairs.size()));
+  for (Index k = 0; const DenseEigenpair& pair : pairs) columns.col(k++) = loss_factors(pair.lambda)[term] * pair.right;
   return parts_of(columns);
 }
 

@@ -1,8 +1,7 @@
 #include "squeal/modes/quadratic.hpp"
-#include "squeal/algebra/quadratic_residual.hpp"
 #include "squeal/algebra/shift_invert.hpp"
+#include "squeal/algebra/sparse_matrices.hpp"
 #include "squeal/base/constants.hpp"
-#include "squeal/base/petsc.hpp"
 #include "squeal/base/progress.hpp"
 #include "squeal/base/run_control.hpp"
 
@@ -230,48 +229,37 @@ const auto oscillates = [](const auto& pair) { return pair.lambda.imag() > oscil
 
 /// Drops the pairs that real eigenvalues become under losses. Where there are more pairs than oscillate without losses,
 /// they are the unmatched pairs nearest to a real one.
-template <class Pair> void drop_real(std::vector<Pair>& pairs, const std::vector<Pair>& without)
+void drop_real(std::vector<DenseEigenpair>& pairs, const std::vector<DenseEigenpair>& without)
 {
   std::vector<Complex> vibrating, all;
-  for (const Pair& pair : without)
+  for (const DenseEigenpair& pair : without)
     if (oscillates(pair)) vibrating.push_back(pair.lambda);
   if (vibrating.size() == without.size() || pairs.size() <= vibrating.size()) return;
-  for (const Pair& pair : pairs) all.push_back(pair.lambda);
+  for (const DenseEigenpair& pair : pairs) all.push_back(pair.lambda);
   const std::vector<std::size_t> theirs = nearest_places(vibrating, all);
-  std::vector<Pair> kept;
+  std::vector<DenseEigenpair> kept;
   for (std::size_t k = 0; k < pairs.size(); ++k)
   {
-    const auto distance = [&](const Pair& other) { return std::abs(other.lambda - pairs[k].lambda); };
+    const auto distance = [&](const DenseEigenpair& other) { return std::abs(other.lambda - pairs[k].lambda); };
     if (std::ranges::count(theirs, k) > 0 || oscillates(*std::ranges::min_element(without, {}, distance)))
       kept.push_back(std::move(pairs[k]));
   }
   pairs = std::move(kept);
 }
 
-/// The pairs that `solve` finds for M, C and K, real or complex; those that are real without losses stay as they are.
-template <class Solve> auto with_losses(const LossyMatrices& problem, const Solve& solve)
+} // namespace
+
+std::vector<DenseEigenpair> solve_lossy_shared(MPI_Comm comm, const LossyMatrices& problem, Vectors which, double limit)
 {
   const auto& [M, C, K, K_loss] = problem;
-  auto without = solve(M, C, K);
+  std::vector<DenseEigenpair> without = solve_dense_quadratic_shared(comm, M, C, K, which, limit);
   if (K_loss.size() == 0) return without;
-  auto pairs = solve(MatrixXcd(M.cast<Complex>()), MatrixXcd(C.cast<Complex>()), MatrixXcd(K + Complex(0, 1) * K_loss));
+  std::vector<DenseEigenpair> pairs =
+      solve_dense_quadratic_shared(comm, MatrixXcd(M.cast<Complex>()), MatrixXcd(C.cast<Complex>()),
+                                   MatrixXcd(K + Complex(0, 1) * K_loss), which, limit);
   drop_real(pairs, without);
   std::ranges::copy_if(without, std::back_inserter(pairs), std::not_fn(oscillates));
   return pairs;
-}
-
-} // namespace
-
-std::vector<DenseEigenpair> solve_lossy_shared(MPI_Comm comm, const LossyMatrices& problem)
-{
-  return with_losses(problem, [&](const auto& M, const auto& C, const auto& K)
-                     { return solve_dense_quadratic_shared(comm, M, C, K); });
-}
-
-std::vector<TwoSidedPair> solve_two_sided_lossy_shared(MPI_Comm comm, const LossyMatrices& problem, double limit)
-{
-  return with_losses(problem, [&](const auto& M, const auto& C, const auto& K)
-                     { return solve_two_sided_shared(comm, M, C, K, limit); });
 }
 
 } // namespace squeal

@@ -1,6 +1,6 @@
 #include "squeal/reduction/reduced_model.hpp"
 #include "reduction_basis.hpp"
-#include "squeal/algebra/quadratic_residual.hpp"
+#include "squeal/algebra/sparse_matrices.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "squeal/contact/contact_operator.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"

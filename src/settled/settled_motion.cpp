@@ -1,7 +1,7 @@
 #include "squeal/settled/settled_motion.hpp"
 #include "squeal/base/cost.hpp"
-#include "squeal/base/mean.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/base/statistics.hpp"
 
 #include <algorithm>
 #include <array>

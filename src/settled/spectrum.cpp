@@ -1,6 +1,6 @@
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/constants.hpp"
-#include "squeal/base/mean.hpp"
+#include "squeal/base/statistics.hpp"
 #include "squeal/settled/motion.hpp"
 
 #include <algorithm>

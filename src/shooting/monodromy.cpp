@@ -19,8 +19,8 @@ FastestMotion fastest_motion(const Flow& flow, const DenseEigenpair& pair,
                              const std::function<Owned<Vec>(const Eigen::VectorXd&)>& state)
 {
   Eigen::Index largest = 0;
-  pair.y.cwiseAbs().maxCoeff(&largest);
-  const Eigen::VectorXcd y = pair.y * (std::conj(pair.y(largest)) / std::abs(pair.y(largest)));
+  pair.right.cwiseAbs().maxCoeff(&largest);
+  const Eigen::VectorXcd y = pair.right * (std::conj(pair.right(largest)) / std::abs(pair.right(largest)));
   FastestMotion motion{state(y.real()), {}};
   if (pair.lambda.imag() != 0)
   {
@@ -45,7 +45,7 @@ std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::Ve
   double best = -1;
   for (std::size_t i = 0; i < pairs.size(); ++i)
   {
-    const double likeness = std::abs(pairs[i].y.dot(flow.normalized())) - 10 * std::abs(pairs[i].lambda - 1.);
+    const double likeness = std::abs(pairs[i].right.dot(flow.normalized())) - 10 * std::abs(pairs[i].lambda - 1.);
     if (i > 0 && likeness <= best) continue;
     best = likeness;
     place = i;
@@ -64,11 +64,11 @@ double moved_by_grid(const Multipliers& multipliers, std::complex<double> value)
   return value.imag() == 0 && value.real() > 0 ? multipliers.trivial_error : 0;
 }
 
-void decide(Multipliers& multipliers, const Completeness& coverage)
+void decide(Multipliers& multipliers, const std::string& missing)
 {
-  multipliers.complete = coverage.complete;
-  multipliers.stability = coverage.complete ? Stability::stable : Stability::undecided;
-  multipliers.would_decide = coverage.complete ? "" : coverage.would_decide;
+  multipliers.complete = missing.empty();
+  multipliers.stability = missing.empty() ? Stability::stable : Stability::undecided;
+  multipliers.would_decide = missing;
   for (std::size_t i = 0; i < multipliers.values.size(); ++i)
   {
     const std::complex<double> value = multipliers.values[i];
@@ -248,7 +248,7 @@ bool is_invariant(const MatrixXd& remainder, const MatrixXd& along)
 void set_pair(const MatrixXd& H, const MatrixXd& remainder, DeflatedSearch& search)
 {
   search.pair = solve_dense_unsymmetric(H).front();
-  search.residual = (remainder * search.pair.y.tail(remainder.cols())).norm();
+  search.residual = (remainder * search.pair.right.tail(remainder.cols())).norm();
   search.bounded = std::abs(search.pair.lambda) + search.residual < 1;
 }
 

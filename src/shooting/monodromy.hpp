@@ -28,13 +28,6 @@ FastestMotion fastest_motion(const Flow& flow, const DenseEigenpair& pair,
 /// The place of the shift in time among the pairs: near 1, with the vector that is closest to the flow.
 std::size_t find_shift(const std::vector<DenseEigenpair>& pairs, const Eigen::VectorXd& flow);
 
-/// Whether larger multipliers than those found are to be expected, and how to find out.
-struct Completeness
-{
-  bool complete = false;
-  std::string would_decide; // of one that is not
-};
-
 /// How an orbit lost its stability by this multiplier.
 Crossing crossing_of(std::complex<double> multiplier);
 
@@ -42,8 +35,8 @@ Crossing crossing_of(std::complex<double> multiplier);
 /// else holds, such as the phase between uncoupled parts. 0 of one that turns.
 double moved_by_grid(const Multipliers& multipliers, std::complex<double> value);
 
-/// Says what the bars allow.
-void decide(Multipliers& multipliers, const Completeness& coverage);
+/// Says what the bars allow. `missing`: why larger multipliers are to be expected, and how to find out; empty: none.
+void decide(Multipliers& multipliers, const std::string& missing);
 
 /// By oblique projection on approximate right and left vectors (src/README.md, section 6.9). `columns`: at most for the
 /// search beside them. Undecided without values, with the reason, where these vectors do not serve.

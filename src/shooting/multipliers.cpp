@@ -56,7 +56,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
         std::max({of_order_1 * (moved + refined), moved_by_grid(multipliers, values[i]), rounding}));
   }
   if (multipliers.values.empty()) return result;
-  decide(multipliers, {true, ""});
+  decide(multipliers, "");
   const auto combined = [&](const Eigen::VectorXd& y)
   { return std::move(states_of(combination(space.right, y), orbit.state).front()); };
   const std::size_t place = deciding_place(multipliers);

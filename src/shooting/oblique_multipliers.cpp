@@ -177,10 +177,10 @@ StateBlock corrections(const Monodromy& monodromy, const SlowMotions& slow, cons
     const DenseEigenpair& pair = passes.pairs[i];
     if (std::find(values.begin(), values.end(), std::conj(pair.lambda)) != values.end()) continue; // the same parts
     values.push_back(pair.lambda);
-    const Eigen::VectorXcd turned = pair.lambda * pair.y;
+    const Eigen::VectorXcd turned = pair.lambda * pair.right;
     of_image.conservativeResize(Eigen::NoChange, of_image.cols() + 2);
     of_Q.conservativeResize(Eigen::NoChange, of_Q.cols() + 2);
-    of_image.rightCols(2) << pair.y.real(), pair.y.imag();
+    of_image.rightCols(2) << pair.right.real(), pair.right.imag();
     of_Q.rightCols(2) << turned.real(), turned.imag();
   }
   StateBlock residuals = combination(passes.image, of_image);
@@ -199,7 +199,7 @@ std::vector<DenseEigenpair> with_shift(const Passes& passes)
   pairs.push_back(shift);
   const std::vector<Complex> values = values_of(passes.pairs);
   if (shift.lambda.imag() != 0 && std::ranges::find(values, std::conj(shift.lambda)) == values.end())
-    pairs.push_back({std::conj(shift.lambda), shift.y.conjugate()});
+    pairs.push_back({std::conj(shift.lambda), shift.right.conjugate()});
   return pairs;
 }
 
@@ -275,7 +275,7 @@ void take_out_shift(Passes& passes)
     while (other < count && passes.pairs[other].lambda != std::conj(value)) ++other;
     if (other == count)
     {
-      passes.pairs.push_back({std::conj(value), passes.shift_pair.y.conjugate()});
+      passes.pairs.push_back({std::conj(value), passes.shift_pair.right.conjugate()});
       passes.bars.push_back(0);
       passes.rises.push_back(0);
     }
@@ -315,32 +315,33 @@ Deflation beside_known(const Monodromy& monodromy, const SlowMotions& slow, cons
   };
 }
 
-Completeness coverage_of(const DeflatedSearch& search)
+/// Why larger multipliers are to be expected; empty: there are none.
+std::string missing_beside(const DeflatedSearch& search)
 {
-  if (search.bounded) return {true, ""};
-  return {false, format("beside the slowest motions a Ritz value of %.4f has a residual of %.1e: a larger "
-                        "-cycle_multipliers would decide",
-                        std::abs(search.pair.lambda), search.residual)};
+  if (search.bounded) return {};
+  return format("beside the slowest motions a Ritz value of %.4f has a residual of %.1e: a larger -cycle_multipliers "
+                "would decide",
+                std::abs(search.pair.lambda), search.residual);
 }
 
 /// The passes, and the search beside them. What that finds joins Q: a motion that the reduced model has not becomes one
 /// of the pairs, and what comes of pairs that have not settled goes. Returns why the vectors do not serve, or nothing.
 std::string make_complete(const Monodromy& monodromy, const SlowMotions& slow, Index columns, Passes& passes,
-                          Completeness& coverage, long& searched)
+                          std::string& missing, long& searched)
 {
   constexpr int rounds = 3;
   if (std::string refusal = begin_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
   for (int round = 1;; ++round)
   {
     if (std::string refusal = make_passes(monodromy, slow, passes); !refusal.empty()) return refusal;
-    coverage = {true, ""}; // a multiplier above 1 needs no other
+    missing.clear(); // a multiplier above 1 needs no other
     if (repels(passes)) return {};
     DeflatedSearch search{true}; // an exact approximation lacks nothing
     if (slow.without_known) search = search_beside(monodromy, beside_known(monodromy, slow, passes), columns);
     searched += search.columns;
-    coverage = coverage_of(search);
+    missing = missing_beside(search);
     if (search.bounded || round == rounds) return {};
-    if (extend(monodromy, combination(search.Q, parts_of(search.pair.y)), passes) == 0) return {};
+    if (extend(monodromy, combination(search.Q, parts_of(search.pair.right)), passes) == 0) return {};
   }
 }
 
@@ -363,9 +364,9 @@ FloquetAnalysis multipliers_by_projection(const Monodromy& monodromy, PetscInt c
   const SlowMotions slow = monodromy.flow.slow_motions(orbit.period, orbit.state);
   if (!slow.missing.empty()) return undecided(slow.missing);
   Passes passes;
-  Completeness coverage;
+  std::string missing;
   const std::string refusal =
-      make_complete(monodromy, slow, columns > 0 ? columns : 96, passes, coverage, multipliers.periods);
+      make_complete(monodromy, slow, columns > 0 ? columns : 96, passes, missing, multipliers.periods);
   if (!refusal.empty()) return undecided(refusal);
   take_out_shift(passes);
   multipliers.trivial_error = passes.shift_distance;
@@ -381,7 +382,7 @@ FloquetAnalysis multipliers_by_projection(const Monodromy& monodromy, PetscInt c
     multipliers.errors.push_back(passes.bars[i]);
     multipliers.upper.push_back(std::abs(passes.pairs[i].lambda) + passes.rises[i]);
   }
-  decide(multipliers, coverage);
+  decide(multipliers, missing);
   if (passes.pairs.empty()) return result;
   const auto combined = [&](const Eigen::VectorXd& y)
   { return std::move(states_of(combination(passes.space.V, y), orbit.state).front()); };

@@ -1,6 +1,5 @@
 #include "constraints.hpp"
 
-#include "squeal/mesh/frames.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 
 #include <algorithm>

@@ -4,7 +4,6 @@
 #include "kernels.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
 #include "squeal/base/constants.hpp"
-#include "squeal/mesh/frames.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 #include "squeal/solid/binary.hpp"
 

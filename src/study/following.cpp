@@ -19,7 +19,7 @@ using Eigen::MatrixXcd;
 using Places = std::vector<Index>;
 
 /// The vectors of one point, one a column, with zeros for shapes that came later.
-MatrixXcd padded(const PointModes& point, Eigen::VectorXcd TwoSidedPair::*side, Index rows)
+MatrixXcd padded(const PointModes& point, Eigen::VectorXcd DenseEigenpair::*side, Index rows)
 {
   MatrixXcd result = MatrixXcd::Zero(rows, static_cast<Index>(point.pairs.size()));
   for (std::size_t k = 0; k < point.pairs.size(); ++k)
@@ -34,7 +34,8 @@ MatrixXcd padded(const PointModes& point, Eigen::VectorXcd TwoSidedPair::*side, 
 MatrixXcd form(const PointModes& lefts, const PointModes& rights, const PointModes& matrices)
 {
   const Index rows = matrices.M.rows();
-  const MatrixXcd left = padded(lefts, &TwoSidedPair::left, rows), right = padded(rights, &TwoSidedPair::right, rows);
+  const MatrixXcd left = padded(lefts, &DenseEigenpair::left, rows),
+                  right = padded(rights, &DenseEigenpair::right, rows);
   MatrixXcd result = left.transpose() * real_times(matrices.M, right);
   for (Index i = 0; i < result.rows(); ++i)
     for (Index j = 0; j < result.cols(); ++j)
@@ -143,13 +144,13 @@ namespace
 {
 
 /// The mode that grows, of two locked in at one frequency, whichever it is of the two.
-std::size_t unstable_partner(const std::vector<TwoSidedPair>& modes, std::size_t mode)
+std::size_t unstable_partner(const std::vector<DenseEigenpair>& modes, std::size_t mode)
 {
   const Complex own = modes[mode].lambda;
   if (is_unstable(own)) return mode;
   const auto locked =
       std::ranges::find_if(modes,
-                           [own](const TwoSidedPair& other)
+                           [own](const DenseEigenpair& other)
                            {
                              const Complex apart = other.lambda - own;
                              return is_unstable(other.lambda) && std::abs(apart.imag()) < std::abs(apart.real());

@@ -77,15 +77,15 @@ VectorXd kept_norms(const MatrixXcd& a, const MatrixXd& kept)
   return (a.conjugate().cwiseProduct(real_times(kept, a))).colwise().sum().real().cwiseMax(0).cwiseSqrt();
 }
 
-MatrixXcd vectors_of(const std::vector<TwoSidedPair>& pairs, Side side)
+MatrixXcd vectors_of(const std::vector<DenseEigenpair>& pairs, Side side)
 {
-  return vectors_of(pairs, side == Side::right ? &TwoSidedPair::right : &TwoSidedPair::left);
+  return vectors_of(pairs, side == Side::right ? &DenseEigenpair::right : &DenseEigenpair::left);
 }
 
 /// Pairs of the projected problem, and how exact they are in the full one.
 struct SolvedPairs
 {
-  std::vector<TwoSidedPair> pairs;             // falling growth rate
+  std::vector<DenseEigenpair> pairs;           // falling growth rate
   std::array<std::vector<double>, 2> errors{}; // backward ones of the vectors, by sides
 
   double backward_error(std::size_t k) const // NaN of either
@@ -97,7 +97,7 @@ struct SolvedPairs
 
 /// Backward errors in the full problem, estimated by the random vectors. Left vectors solve the transposed problem.
 std::vector<double> backward_errors(const ModesBasis& modes, const PointMatrices& on_basis,
-                                    const std::vector<TwoSidedPair>& pairs, Side side)
+                                    const std::vector<DenseEigenpair>& pairs, Side side)
 {
   if (pairs.empty()) return {};
   const Index tests = modes.basis.sketched, shapes = modes.basis.shapes();
@@ -144,7 +144,7 @@ MatrixXcd random_weights(Index rows, Index columns)
 
 /// Appends to `residuals` those of some vectors, over their backward error's scale, with zeros at the pivots. Of many,
 /// random mixtures of real and imaginary parts span the same leading directions.
-void append_residuals(const ModesBasis& modes, const LinearisedPoint& point, const std::vector<TwoSidedPair>& pairs,
+void append_residuals(const ModesBasis& modes, const LinearisedPoint& point, const std::vector<DenseEigenpair>& pairs,
                       Side side, MultiVector& residuals)
 {
   if (pairs.empty()) return;
@@ -163,7 +163,7 @@ void append_residuals(const ModesBasis& modes, const LinearisedPoint& point, con
 
 /// The backward error that a pair may have. Near the limit of stability it is a hundredth: of the error of lambda, the
 /// product of both sides, that is 1e-4.
-double tolerance_of(const TwoSidedPair& pair, const PointProblem& problem)
+double tolerance_of(const DenseEigenpair& pair, const PointProblem& problem)
 {
   constexpr double near_limit = 1e-4; // of |lambda|
   const bool near = std::abs(pair.lambda.real()) < near_limit * std::abs(pair.lambda);
@@ -171,10 +171,10 @@ double tolerance_of(const TwoSidedPair& pair, const PointProblem& problem)
 }
 
 /// Those pairs whose error of a side exceeds the tolerance.
-std::vector<TwoSidedPair> inexact(const SolvedPairs& solved, const PointProblem& problem, Side side)
+std::vector<DenseEigenpair> inexact(const SolvedPairs& solved, const PointProblem& problem, Side side)
 {
   const std::vector<double>& errors = solved.errors[static_cast<std::size_t>(side)];
-  std::vector<TwoSidedPair> chosen;
+  std::vector<DenseEigenpair> chosen;
   for (std::size_t k = 0; k < solved.pairs.size(); ++k)
     if (errors[k] > tolerance_of(solved.pairs[k], problem)) chosen.push_back(solved.pairs[k]);
   return chosen;
@@ -194,10 +194,10 @@ LossyMatrices without_sketch(const PointMatrices& on_basis, Index shapes)
 /// The pairs of the projected problem in the window, falling growth rate.
 SolvedPairs solve_projected(const ModesBasis& modes, const PointMatrices& on_basis, const Window& window)
 {
-  std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(
-      modes.basis.T.comm, without_sketch(on_basis, modes.basis.shapes()), std::sqrt(window.limit));
-  std::erase_if(pairs, [&](const TwoSidedPair& pair) { return !window.holds(pair.lambda); });
-  std::ranges::stable_sort(pairs, std::greater{}, [](const TwoSidedPair& pair) { return pair.lambda.real(); });
+  std::vector<DenseEigenpair> pairs = solve_lossy_shared(
+      modes.basis.T.comm, without_sketch(on_basis, modes.basis.shapes()), Vectors::both, std::sqrt(window.limit));
+  std::erase_if(pairs, [&](const DenseEigenpair& pair) { return !window.holds(pair.lambda); });
+  std::ranges::stable_sort(pairs, std::greater{}, [](const DenseEigenpair& pair) { return pair.lambda.real(); });
   SolvedPairs solved{std::move(pairs)};
   for (const Side side : {Side::right, Side::left})
     solved.errors[static_cast<std::size_t>(side)] = backward_errors(modes, on_basis, solved.pairs, side);
@@ -251,7 +251,7 @@ bool correct(ModesBasis& modes, MultiVector residuals)
   return extend(modes.basis, product(modes.contact.Z, responses)) > 0;
 }
 
-bool in_band(const TwoSidedPair& pair, double band)
+bool in_band(const DenseEigenpair& pair, double band)
 {
   return std::abs(pair.lambda) < two_pi * band;
 }

@@ -64,9 +64,9 @@ struct PointProblem
 struct PointModes
 {
   Outcome outcome;
-  std::vector<TwoSidedPair> pairs; // falling growth rate, up to a little beyond the band
-  std::vector<double> errors;      // the larger backward error of both vectors
-  Eigen::MatrixXd M{}, C{};        // of the point, on the basis
+  std::vector<DenseEigenpair> pairs; // falling growth rate, up to a little beyond the band
+  std::vector<double> errors;        // the larger backward error of both vectors
+  Eigen::MatrixXd M{}, C{};          // of the point, on the basis
 };
 
 /// The backward error of vectors that are exact.
@@ -83,7 +83,7 @@ PointModes find_point_modes(ModesBasis& basis, const PointProblem& problem);
 inline constexpr double followed_band = 1.05;
 
 /// Whether |lambda| is below the end of a band [Hz].
-bool in_band(const TwoSidedPair& pair, double band);
+bool in_band(const DenseEigenpair& pair, double band);
 
 // Modes followed from point to point by the biorthogonal MAC, and where they become unstable or stable between two
 // points (src/README.md, sections 10.3 and 10.5).

@@ -2,8 +2,8 @@
 #include "squeal/study/robustness.hpp"
 
 #include "squeal/base/error.hpp"
-#include "squeal/base/random.hpp"
 #include "squeal/base/run_control.hpp"
+#include "squeal/base/statistics.hpp"
 
 #include <algorithm>
 #include <boost/math/distributions/binomial.hpp>

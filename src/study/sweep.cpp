@@ -234,7 +234,7 @@ private:
   /// zero than both are from each other. Any other would need a way of three times that length.
   bool may_change_stability(const Followed& before, const Followed& now, const std::vector<Match>& matches) const
   {
-    const std::vector<TwoSidedPair>&from = before.modes.pairs, &to = now.modes.pairs;
+    const std::vector<DenseEigenpair>&from = before.modes.pairs, &to = now.modes.pairs;
     const double band = problem_.modes.band;
     std::vector<char> matched(to.size(), 0);
     for (std::size_t i = 0; i < matches.size(); ++i)
@@ -338,7 +338,7 @@ private:
     SweepPoint point{now, now.inserted, now.modes.outcome, now.closed, 0, {}};
     for (std::size_t k = 0; k < now.modes.pairs.size(); ++k)
     {
-      const TwoSidedPair& pair = now.modes.pairs[k];
+      const DenseEigenpair& pair = now.modes.pairs[k];
       const bool inside = in_band(pair, problem_.modes.band);
       point.unstable += inside && is_unstable(pair.lambda);
       const Match match = matches.empty() ? Match{0, 1, 1} : matches[k];

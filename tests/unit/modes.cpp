@@ -3,7 +3,7 @@
 #include "../support/linearised.hpp"
 #include "../support/sliding_oscillator.hpp"
 #include "squeal/algebra/dense_matrix.hpp"
-#include "squeal/algebra/quadratic_residual.hpp"
+#include "squeal/algebra/sparse_matrices.hpp"
 #include "squeal/base/constants.hpp"
 #include "squeal/equilibrium/linearised_sliding.hpp"
 #include "squeal/modes/quadratic.hpp"

@@ -60,8 +60,9 @@ TEST_CASE("pairs take losses, with both vectors, whatever the bases of the two s
   K.diagonal() += Eigen::VectorXd::LinSpaced(n, 10, 400);
   const MatrixXd P = rotation(), R = rotation(), K_loss = 0.2 * K + part * part.transpose() / n;
   const LossyMatrices problem{P * M * R, P * C * R, P * K * R, P * K_loss * R};
-  const std::size_t count = solve_two_sided_shared(PETSC_COMM_WORLD, problem[0], problem[1], problem[2]).size();
-  const std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, HUGE_VAL);
+  const std::size_t count =
+      solve_dense_quadratic_shared(PETSC_COMM_WORLD, problem[0], problem[1], problem[2], Vectors::both).size();
+  const std::vector<DenseEigenpair> pairs = solve_lossy_shared(PETSC_COMM_WORLD, problem, Vectors::both, HUGE_VAL);
   REQUIRE(pairs.size() == count);
   for (std::size_t i = 0; i < count; ++i)
   {
@@ -87,10 +88,10 @@ TEST_CASE("pairs below a limit of a larger problem take their losses, each its o
   K += 1e-2 * matrix();
   const LossyMatrices problem{M, C, K, 0.05 * K + 0.1 * part * part.transpose()};
   const double limit = 26; // of the lower quarter: the others are far away
-  std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, limit);
-  std::erase_if(pairs, [&](const TwoSidedPair& pair) { return std::abs(pair.lambda) > limit; });
-  std::vector<TwoSidedPair> all = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, HUGE_VAL);
-  std::erase_if(all, [&](const TwoSidedPair& pair) { return std::abs(pair.lambda) > limit; });
+  std::vector<DenseEigenpair> pairs = solve_lossy_shared(PETSC_COMM_WORLD, problem, Vectors::both, limit);
+  std::erase_if(pairs, [&](const DenseEigenpair& pair) { return std::abs(pair.lambda) > limit; });
+  std::vector<DenseEigenpair> all = solve_lossy_shared(PETSC_COMM_WORLD, problem, Vectors::both, HUGE_VAL);
+  std::erase_if(all, [&](const DenseEigenpair& pair) { return std::abs(pair.lambda) > limit; });
   CHECK(pairs.size() == all.size());
   REQUIRE(pairs.size() >= 55);
   for (std::size_t i = 0; i < pairs.size(); ++i)
@@ -130,7 +131,7 @@ TEST_CASE("modes keep themselves as they take losses, however near to lock-in an
       K.block(20, 20, 2, 2) << 210, 5, -5, 220 + 10 * distance; // the two meet at distance 0
       K += damped * coupling;
       const LossyMatrices problem{M, damped * damping, K, 1e-2 * K + 0.1 * part * part.transpose()};
-      const std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, HUGE_VAL);
+      const std::vector<DenseEigenpair> pairs = solve_lossy_shared(PETSC_COMM_WORLD, problem, Vectors::both, HUGE_VAL);
       CHECK(pairs.size() == static_cast<std::size_t>(n));
       for (std::size_t i = 0; i < pairs.size(); ++i)
       {
@@ -164,7 +165,8 @@ TEST_CASE("near neighbours that a loss factor mixes stay two")
         part(19) = std::cos(angle);
         part(20) = std::sin(angle);
         const LossyMatrices problem{M, damping, K, eta * K(19, 19) * part * part.transpose()};
-        const std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, HUGE_VAL);
+        const std::vector<DenseEigenpair> pairs =
+            solve_lossy_shared(PETSC_COMM_WORLD, problem, Vectors::both, HUGE_VAL);
         const std::vector<DenseEigenpair> modes = solve_lossy_shared(PETSC_COMM_WORLD, problem);
         REQUIRE(pairs.size() == static_cast<std::size_t>(n));
         REQUIRE(modes.size() == static_cast<std::size_t>(n));
@@ -199,16 +201,16 @@ TEST_CASE("pairs below a limit are those of the whole problem, with both vectors
       C.block(first, first, half, half) = damping;
     }
     const double limit = 6.5;
-    std::vector<TwoSidedPair> all = solve_two_sided_shared(PETSC_COMM_WORLD, M, C, K),
-                              some = solve_two_sided_shared(PETSC_COMM_WORLD, M, C, K, limit);
+    std::vector<DenseEigenpair> all = solve_dense_quadratic_shared(PETSC_COMM_WORLD, M, C, K, Vectors::both),
+                                some = solve_dense_quadratic_shared(PETSC_COMM_WORLD, M, C, K, Vectors::both, limit);
     CHECK(some.size() < all.size() / 2);
-    for (std::vector<TwoSidedPair>* pairs : {&all, &some})
-      std::erase_if(*pairs, [&](const TwoSidedPair& pair) { return std::abs(pair.lambda) > limit; });
+    for (std::vector<DenseEigenpair>* pairs : {&all, &some})
+      std::erase_if(*pairs, [&](const DenseEigenpair& pair) { return std::abs(pair.lambda) > limit; });
     REQUIRE(some.size() == all.size());
     for (const auto& [lambda, right, left] : some)
     {
       double nearest = HUGE_VAL;
-      for (const TwoSidedPair& pair : all) nearest = std::min(nearest, std::abs(pair.lambda - lambda));
+      for (const DenseEigenpair& pair : all) nearest = std::min(nearest, std::abs(pair.lambda - lambda));
       CHECK(nearest < 1e-8 * std::abs(lambda)); // the root of rounding, where two coincide
       const MatrixXcd Q = lambda * lambda * M + lambda * C + K;
       CHECK((Q * right).norm() < 1e-13 * K.norm());
@@ -224,7 +226,7 @@ TEST_CASE("one loss factor everywhere gives the closed form of complex stiffness
   for (const double eta : {0.02, 0.3, 5.})
   {
     const LossyMatrices problem{one, none, w * w * one, eta * w * w * one};
-    const std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, HUGE_VAL);
+    const std::vector<DenseEigenpair> pairs = solve_lossy_shared(PETSC_COMM_WORLD, problem, Vectors::both, HUGE_VAL);
     REQUIRE(pairs.size() == 1);
     const Complex exact = Complex(0, w) * std::sqrt(Complex(1, eta));
     CHECK(std::abs(pairs[0].lambda - exact) < 1e-13 * w);
@@ -237,7 +239,7 @@ TEST_CASE("what is overdamped without losses does not vibrate with them, and wha
   K.diagonal() << 9, 16, 1, -4;
   C(2, 2) = 50;
   const LossyMatrices problem{M, C, K, 0.1 * K.cwiseAbs()};
-  std::vector<TwoSidedPair> pairs = solve_two_sided_lossy_shared(PETSC_COMM_WORLD, problem, HUGE_VAL);
+  std::vector<DenseEigenpair> pairs = solve_lossy_shared(PETSC_COMM_WORLD, problem, Vectors::both, HUGE_VAL);
   const auto real = std::ranges::stable_partition(pairs, [](const auto& pair) { return pair.lambda.imag() > 0; });
   REQUIRE(pairs.size() == 6);
   REQUIRE(real.size() == 4);
@@ -259,7 +261,7 @@ TEST_CASE("left and right vectors of unsymmetric quadratic problems solve them, 
     const MatrixXd M = MatrixXd::Identity(n, n) + 0.2 / n * matrix(), C = 0.05 * matrix();
     MatrixXd K = 3 * matrix();
     K.diagonal() += Eigen::VectorXd::LinSpaced(n, 10, 100);
-    const std::vector<TwoSidedPair> pairs = solve_two_sided_shared(PETSC_COMM_WORLD, M, C, K);
+    const std::vector<DenseEigenpair> pairs = solve_dense_quadratic_shared(PETSC_COMM_WORLD, M, C, K, Vectors::both);
     REQUIRE(static_cast<int>(pairs.size()) >= n);
     const std::vector<DenseEigenpair> right_only = solve_dense_quadratic_shared(PETSC_COMM_SELF, M, C, K);
     REQUIRE(right_only.size() == pairs.size());

@@ -61,36 +61,33 @@ Eigen::MatrixXd orthonormal_columns(const Eigen::MatrixXd& A);
 // square; `Matrix` is Eigen::MatrixXd or MatrixXcd. Functions whose name ends in _shared are collective; the others
 // work on one rank alone. Where LAPACK does not converge they throw Error.
 
-/// An eigenvalue with its vector, of 2-norm 1.
+/// An eigenvalue with its vectors: Q(lambda) right = 0, left' Q(lambda) = 0, Q = A - lambda or lambda^2 M + lambda C +
+/// K; the prime transposes without conjugation. 2-norms are 1. Q may have loss factors too (dense_losses.hpp).
 struct DenseEigenpair
 {
   std::complex<double> lambda;
-  Eigen::VectorXcd y; // 2-norm 1
-};
-
-/// An eigenvalue with both of its vectors: Q(lambda) right = 0, left' Q(lambda) = 0, Q = lambda^2 M + lambda C + K; the
-/// prime transposes without conjugation. 2-norms are 1. Q may have loss factors too (dense_losses.hpp).
-struct TwoSidedPair
-{
-  std::complex<double> lambda;
-  Eigen::VectorXcd right, left;
+  Eigen::VectorXcd right, left{}; // without entries: not asked for
 };
 
 /// The vectors of one side as columns; empty without pairs.
-Eigen::MatrixXcd vectors_of(std::span<const TwoSidedPair> pairs, Eigen::VectorXcd TwoSidedPair::*side);
-
-/// The pairs of solve_dense_quadratic_shared with |lambda| <= limit and their left vectors, from the matrices of rank
-/// 0, on every rank. Collective.
-template <class Matrix> std::vector<TwoSidedPair>
-solve_two_sided_shared(MPI_Comm comm, const Matrix& M, const Matrix& C, const Matrix& K, double limit = HUGE_VAL);
+Eigen::MatrixXcd vectors_of(std::span<const DenseEigenpair> pairs, Eigen::VectorXcd DenseEigenpair::*side);
 
 /// Gives every rank the pairs of rank 0, whose vectors have so many rows. Collective.
-void share(MPI_Comm comm, std::vector<TwoSidedPair>& pairs, Eigen::Index rows);
+void share(MPI_Comm comm, std::vector<DenseEigenpair>& pairs, Eigen::Index rows);
 
-/// The pairs (lambda^2 M + lambda C + K) y = 0 with Im(lambda) >= 0 and finite lambda, from the matrices of rank 0, on
-/// every rank. M, C and K are of one size and not symmetric in general. Collective.
+/// The vectors of pairs that are wanted.
+enum class Vectors
+{
+  right,
+  both,
+};
+
+/// The pairs of lambda^2 M + lambda C + K with Im(lambda) >= 0 and finite |lambda| <= limit, from the matrices of rank
+/// 0, on every rank. M, C and K are of one size and not symmetric in general. Collective.
 template <class Matrix> std::vector<DenseEigenpair> solve_dense_quadratic_shared(MPI_Comm comm, const Matrix& M,
-                                                                                 const Matrix& C, const Matrix& K);
+                                                                                 const Matrix& C, const Matrix& K,
+                                                                                 Vectors which = Vectors::right,
+                                                                                 double limit = HUGE_VAL);
 
 /// All eigenpairs of A, the largest modulus first, of a complex pair first the one with Im(lambda) > 0.
 std::vector<DenseEigenpair> solve_dense_unsymmetric(const Eigen::MatrixXd& A);

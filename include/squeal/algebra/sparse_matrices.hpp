@@ -93,4 +93,22 @@ bool is_sparse(Mat A);
 /// where PETSc's product takes four. Collective.
 Eigen::MatrixXd sparse_product(Mat A, const Eigen::MatrixXd& X);
 
+// The residual of the quadratic eigenproblem with distributed matrices and real arithmetic.
+
+/// Borrowed.
+struct QuadraticMatrices
+{
+  Mat M, C, K;
+};
+
+/// Borrowed; the two parts of a complex vector.
+struct ComplexVector
+{
+  Vec real, imaginary;
+};
+
+/// residual = (lambda^2 M + lambda C + K) y. Collective.
+void quadratic_residual(const QuadraticMatrices& A, std::complex<double> lambda, ComplexVector y,
+                        ComplexVector residual);
+
 } // namespace squeal

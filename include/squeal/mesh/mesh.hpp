@@ -115,4 +115,8 @@ double diagonal_of(const std::vector<Vec3>& nodes);
 /// Gives every rank the mesh that rank 0 has. Collective.
 void broadcast_mesh(Mesh& mesh, MPI_Comm comm);
 
+/// The axes 1, 2 and 3 of a frame at a place. Throws Error for one on the axis of a cylinder; `user` says whose frame
+/// it is. Not collective.
+std::array<Vec3, 3> axes_at(const Frame& frame, const Vec3& place, const std::string& user);
+
 } // namespace squeal

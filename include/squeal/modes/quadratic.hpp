@@ -106,10 +106,9 @@ using LossyMatrices = std::array<Eigen::MatrixXd, 4>;
 /// The sum of f_k A_k.
 Eigen::MatrixXcd sum(const LossyMatrices& A, const ComplexFactors& factors);
 
-/// All pairs with Im(lambda) >= 0. Those that are real without K_loss stay as they are. Collective.
-std::vector<DenseEigenpair> solve_lossy_shared(MPI_Comm comm, const LossyMatrices& problem);
-
-/// Eigenpairs with |lambda| <= limit, with both vectors. Collective.
-std::vector<TwoSidedPair> solve_two_sided_lossy_shared(MPI_Comm comm, const LossyMatrices& problem, double limit);
+/// All pairs with Im(lambda) >= 0 and |lambda| <= limit. Those that are real without K_loss stay as they are.
+/// Collective.
+std::vector<DenseEigenpair> solve_lossy_shared(MPI_Comm comm, const LossyMatrices& problem,
+                                               Vectors which = Vectors::right, double limit = HUGE_VAL);
 
 } // namespace squeal

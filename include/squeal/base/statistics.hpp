@@ -1,6 +1,7 @@
 #pragma once
-/// Random numbers that are the same on every machine.
+/// Random numbers that are the same on every machine, and means.
 #include <cstdint>
+#include <numeric>
 #include <random>
 
 namespace squeal
@@ -19,6 +20,12 @@ constexpr std::uint64_t splitmix64(std::uint64_t number)
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
   x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
   return x ^ (x >> 31);
+}
+
+/// The mean of a list of numbers, which has at least one. Not collective.
+template <class List> double mean(const List& values)
+{
+  return std::accumulate(values.begin(), values.end(), 0.) / static_cast<double>(values.size());
 }
 
 } // namespace squeal
