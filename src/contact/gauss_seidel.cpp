@@ -285,8 +285,7 @@ void sweep_over_whole(ContactWork& work, const ContactSettings& settings)
 
 void gauss_seidel(ContactWork& work, const ContactSettings& settings)
 {
-  const ContactOperator& W = work.W;
-  if (W.has_near_field()) sweep_until_converged<float>({work, W.turns(), W.shared_by()}, settings);
+  if (work.W.has_near_field()) sweep_until_converged<float>({work, work.W.turns(), work.W.shared_by()}, settings);
   if (!work.result.converged && work.result.iterations < settings.max_iterations) sweep_over_whole(work, settings);
 }
 

@@ -53,7 +53,7 @@ FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
                  refined = std::abs(std::abs(finer[at_finer[i]]) - size);
     multipliers.values.push_back(values[i]);
     multipliers.errors.push_back(
-        std::max({of_order_1 * (moved + refined), moved_by_grid(multipliers, values[i]), rounding}));
+        std::max({moved + of_order_1 * refined, moved_by_grid(multipliers, values[i]), rounding}));
   }
   if (multipliers.values.empty()) return result;
   decide(multipliers, "");

@@ -200,7 +200,7 @@ def test_a_signal_is_no_error_of_what_is_under_way(tmp_path, where):
 def test_a_run_that_ends_in_its_verdict_keeps_the_cycle(ranks, fidelity, watched, squeal, tmp_path):
     """It is ended soon after the last line before the verdict, which watches many periods beside the cycle; or before, or when all is
     done, where the machine is busy. The restart decides, to what ranks agree within."""
-    asked = [*FOUR_PAIRS[:-2], "--set", f"fidelity={fidelity}", "-cycle_watched_periods", watched]
+    asked = [*FOUR_PAIRS[:-2], "--set", "cycle.steps_per_period=64", "--set", f"fidelity={fidelity}", "-cycle_watched_periods", watched]
     whole = squeal(*asked, ranks=ranks)
     lines = whole.printed[:whole.printed.index("settled …")].count("\n")
     for after in (0.1, 0.3, 0.05, 1):

@@ -76,33 +76,3 @@ TEST_CASE("a kept step reaches a period nearby within some percent of what the l
   CHECK(steps_kept >= 2);
   CHECK(steps_kept < 5);
 }
-
-TEST_CASE("where the step is kept, contact is solved to a small part of what the last period moved")
-{
-  const SmallModel model = pressed_masses();
-  const Equilibrium equilibrium = find_equilibrium(model.structure, model.interface, {});
-  const SlidingEquilibrium sliding{model.structure, model.interface, equilibrium};
-  PeriodMap kept{sliding, {}, 100, 0.5}, exact{sliding, {}, 100, 0.5};
-  kept.keeps_step = true;
-  kept.options.contact.tolerance = exact.options.contact.tolerance = 1e-12;
-  const double period = 4;
-  const Owned<Vec> v = zeros_like(equilibrium.u);
-  check(VecSet(v, 2)); // pairs lift off
-  const Owned<Vec> start = state_of(equilibrium.u, v), end = zeros_like(start), rate = zeros_like(start),
-                   reached = zeros_like(start);
-  flow_of(kept).integrate(period, start, end, rate);
-  CHECK(kept.step.contact.tolerance == 1e-12); // nothing is known of a period before
-  const double moved = kept.kept.moved;
-  REQUIRE(moved > 1e-2);
-  flow_of(kept).integrate(period, end, reached, rate);
-  CHECK(kept.step.contact.tolerance == std::min(1e-6, 1e-4 * moved));
-  flow_of(exact).integrate(period, end, start, rate);
-  check(VecAXPY(reached, -1, start));
-  double error = 0, speed = 0;
-  check(VecNorm(velocity(reached), NORM_2, &error));
-  check(VecNorm(velocity(start), NORM_2, &speed));
-  CHECK(error > 0); // it makes a difference
-  CHECK(error <= 1e-4 * moved * speed);
-  record_period(kept, period, end, {});
-  CHECK(kept.step.contact.tolerance == 1e-12);
-}

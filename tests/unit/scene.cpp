@@ -255,7 +255,7 @@ TEST_CASE("a wrong override says which one and what is near")
                 {"--set friction.coeficient=0.3", "unknown key 'coeficient'", "did you mean 'coefficient'"});
   check_message(error_of(points, {"fricton.coefficient=0.3"}), {"--set", "'fricton'", "'friction'"});
   check_message(error_of(points, {"point.dics.mass=1"}), {"--set", "'dics'", "'disc'"});
-  check_message(error_of(points, {"contact.1.gap=0"}), {"--set", "[[contact]]", "'1'"});
+  check_message(error_of(points, {"contact.1.gap=0"}), {"--set", "contact has no entry '1'"});
   check_message(error_of(points, {"friction.coefficient"}), {"--set", "KEY=VALUE"});
   check_message(error_of(points, {"a..b=1"}), {"--set", "KEY"});
   check_message(error_of(points, {"friction.coefficient=much"}), {"--set", "much", "not text"});
