@@ -232,8 +232,8 @@ def test_the_projection_finds_the_multiplier_of_arnoldi(squeal):
 
 @pytest.mark.parametrize("change", [[], ["friction.coefficient=0.48", "damping.beta=4e-7"]])
 def test_the_projection_finds_a_multiplier_that_its_reduced_model_lacks(squeal, tmp_path, change):
-    """1.185 and 1.27 by the whole matrix, all complex. The reduced model of the recorded contact has none above 0.96. The whole
-    matrix has means over eight points of each step, the projection one grid, which 4e-3 hold and its bar."""
+    """1.185 and 1.27 by the whole matrix, all complex. The reduced model of the recorded contact has none above 0.96. 4e-3: what
+    the grid leaves."""
     scene = [write_block_on_plate(tmp_path), "-cycle_free_periods", "0", "-settled_periods", "1"]
     scene += [word for key in change for word in ("--set", key)]
     largest = []
