@@ -244,7 +244,8 @@ def test_bars_of_multipliers_hold_what_impacts_within_a_step_change(squeal, tmp_
 ])
 def test_events_inside_steps_carry_small_motions_on(squeal, friction, speed, damping, across, disc, mass, along, exact):
     """The oscillator where it lifts off far, against central differences of event-driven integration. Tangents of steps alone were
-    off by 0.06 at any number of steps, and the multiplier of the shift in time by 0.1."""
+    off by 0.06 at any number of steps, and the multiplier of the shift in time by 0.1. What the grid moves that by is no part of the
+    bar of a pair that turns."""
     values = {"friction.coefficient": friction, "contact.0.velocity": f"[{speed},0,0]", "spring.0.damping": damping,
               "spring.1.damping": damping, "spring.3.damping": damping, "spring.2.stiffness": across, "spring.3.stiffness": disc,
               "spring.1.stiffness": along, "point.disc.mass": mass, "cycle.steps_per_period": 0, "cycle.tolerance": 0,
@@ -252,7 +253,7 @@ def test_events_inside_steps_carry_small_motions_on(squeal, friction, speed, dam
     run = squeal(INPUTS / "oscillator" / "scene.toml", *(word for key, value in values.items() for word in ("--set", f"{key}={value}")), ranks=1)
     found = run.report["cycle"]["multipliers"]
     assert run.code == 0 and found["stability"] == "stable" and found["trivial_error"] < 0.01
-    assert abs(found["largest"] - exact) <= found["largest_error"] < 0.01
+    assert abs(found["largest"] - exact) <= found["largest_error"] + found["trivial_error"] and found["largest_error"] < 0.01
 
 
 @pytest.mark.parametrize("steps", [100, 400])
