@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import subprocess
+import time
 
 import pytest
 
@@ -56,6 +57,7 @@ def test_a_run_of_other_arguments_or_inputs_is_not_done(tmp_path):
 def test_a_signal_ends_a_job_and_the_next_start_goes_on(tmp_path):
     run = job(tmp_path, "long_run.sh", wait=False, PERIODS="100000")
     wait_for(lambda: (tmp_path / "estimate" / ".partial" / "history.h5").exists())
+    time.sleep(0.5)  # until a step is made: the run has 100000 periods
     run.terminate()
     run.communicate(timeout=300)
     assert run.returncode == 3
