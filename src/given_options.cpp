@@ -116,8 +116,8 @@ std::string problem_of_option(const std::string& name, const std::string& value)
   std::string problem;
   if (const std::optional<Value> kind = kind_of(name))
     problem = problem_of_value(*kind, value);
-  else if ((value.empty() && name.ends_with("_type")) || name + value == "modes_pep_typejd" ||
-           name + value == "cycle_snes_typeaspin")
+  else if (name.ends_with("_type") && (value.empty() || (name == "modes_pep_type" && value == "jd") ||
+                                       (name == "cycle_snes_type" && value == "aspin")))
     problem = "it takes a type that needs no more than an operator";
   else
     return problem_of_option_name(name);

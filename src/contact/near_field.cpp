@@ -5,10 +5,10 @@
 
 #include "squeal/base/broadcast.hpp"
 #include "squeal/base/cost.hpp"
+#include "squeal/base/dense.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <Eigen/Core>
 #include <utility>
 
 namespace squeal
@@ -17,7 +17,6 @@ namespace squeal
 namespace
 {
 
-using Eigen::Index;
 using Sizes = Eigen::MatrixXf; // pairs x pairs
 
 constexpr double neighbour = 0.1;     // size of a block between neighbours, at least; they have 0.2 and more

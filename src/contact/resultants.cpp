@@ -53,7 +53,8 @@ bool leave_out_where_turned(PairView<const double> r, PairView<const double> w, 
 PairFriction at_release(PairFriction friction, PairView<const double> last, PairView<const double> before)
 {
   constexpr double more = 1 + 1e-6; // than in sliding
-  for (std::size_t i = 0; any_law(friction, has_two_levels) && i < before.pairs(); ++i)
+  if (!any_law(friction, has_two_levels)) return friction;
+  for (std::size_t i = 0; i < before.pairs(); ++i)
   {
     FrictionLaw law = friction.of(i);
     if (!has_two_levels(law) || last.normal(i) <= 0 || before.normal(i) <= 0) continue;
@@ -61,8 +62,7 @@ PairFriction at_release(PairFriction friction, PairView<const double> last, Pair
     { return length(r.tangential(i)) / (law.static_coefficient * r.normal(i)); };
     const double now = use(last), rise = now - use(before);
     if (rise <= 0 || now * law.static_coefficient <= more * law.coefficient) continue;
-    const double part =
-        std::clamp((1 - now) / rise - 0.5, -0.5, 0.5); // of the step, less what the last one held too long
+    const double part = std::clamp((1 - now) / rise - 0.5, -0.5, 0.5); // of the step, less what the last one held
     law.coefficient = std::max(0., law.coefficient + part * (law.static_coefficient - law.coefficient));
     friction.number_of_own.resize(before.pairs(), -1);
     friction.number_of_own[i] = static_cast<int>(friction.own.size());

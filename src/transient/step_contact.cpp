@@ -96,11 +96,12 @@ StepProblem make_problem(const OneStep& one, const std::vector<double>& Bv_free)
   const std::vector<std::vector<double>> motion = relative(interface, std::array{work.v_theta.get(), state.v.get()});
   const std::vector<double>&position = motion[0], &velocity = motion[1];
   const auto& known = work.memory.r; // the last solutions
-  const bool goes_on = known.size() > 1 && known[0] == state.reactions;
+  std::span<const double> earlier;   // where the solutions go on from each other
+  if (known.size() > 1 && known[0] == state.reactions) earlier = known[1];
   StepProblem problem{free_contact_velocity(one, {position, velocity, state.slip}, Bv_free),
                       {},
                       at_release(scaled(interface, factors.friction), PairView(state.reactions, interface.directions),
-                                 PairView(goes_on ? known[1] : std::vector<double>(), interface.directions))};
+                                 PairView(earlier, interface.directions))};
   std::vector<ContactStatus> before =
       status_with(interface, law_before, factors.drive_start, state.reactions, velocity);
   hold_anchors(interface, position, before, work.anchors);

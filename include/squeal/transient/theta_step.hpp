@@ -182,8 +182,8 @@ void advance_tangents(const ThetaStep& step, const Structure& structure, const I
 // A motion beside the recorded one meets an event at another time, and leaves it on another flow. The tangent of the
 // steps lacks that where an event's own step has statuses that the motion after it has not.
 
-/// An impact of a pair, or a turn of its sliding. What passes zero there is c: the gap, or the velocity along the
-/// direction of sliding.
+/// An impact of a pair, or a turn of its sliding. c passes zero there: the gap, or the velocity along the direction of
+/// sliding.
 struct StepEvent
 {
   std::size_t pair = 0;
