@@ -86,7 +86,7 @@ UnstableModes modes_sought(const MotionSearch& search)
 }
 
 /// The start of the search for a cycle: the settled motion, the checkpoint's orbit, the scene's state (a file or the
-/// transient's end), or, where modes only diverge, a state beside the equilibrium. Else the unstable modes at their
+/// transient's end). Where modes only diverge, it is a state beside the equilibrium. Else the unstable modes at their
 /// estimates' amplitudes; nothing where contact limits none.
 std::optional<GivenStart> cycle_start(const MotionSearch& search, const CycleSettings& settings)
 {
@@ -304,9 +304,9 @@ void seek_from_settled(MotionSearch& search, const char* name)
 }
 
 /// The ways, in their order. Each decides whether it has the answer:
-/// - a cycle: its verdict is that of `judge` (shooting/verdict.cpp), by its multipliers and motions beside it. One that
-///   attracts has converged; one that repels is an unstable cycle, and the search goes on from its free motion;
-/// - a settled motion: its kind is that of `judge_motion` (settled/motion.cpp), by exponents, spectrum and energies.
+/// - A cycle: its verdict is that of `judge` (shooting/verdict.cpp), by its multipliers and motions beside it. One that
+/// attracts has converged. One that repels is an unstable cycle, and the search goes on from its free motion.
+/// - A settled motion: its kind is that of `judge_motion` (settled/motion.cpp), by exponents, spectrum and energies.
 constexpr std::array ways = {
     Way{"cycle from the checkpoint", [](const MotionSearch& search) { return search.resumed.has_value(); },
         seek_from_checkpoint},
@@ -339,9 +339,9 @@ bool is_open(const Motion& motion)
 
 constexpr int finest = 1024; // steps a period
 
-/// Whether more steps a period may change the answer. "auto" must choose them, and a settled motion must be affordable,
-/// until a motion without a cycle does as it did at the steps before. The grid of time alone can make a motion of
-/// impacts wander; it then diverges by the step, not by the period.
+/// Whether more steps a period may change the answer. With "auto" alone they may, where a settled motion is affordable.
+/// It ends when a motion without a cycle does as it did at the steps before. The grid of time alone can make a motion
+/// of impacts wander; it then diverges by the step, not by the period.
 bool steps_may_decide(const MotionSearch& search)
 {
   constexpr double of_settling = 512; // periods

@@ -8,8 +8,8 @@
 ///
 /// The answer goes to a descriptor of its own. This program knows no MPI.
 ///
-/// The sandbox: seccomp refuses system calls, Landlock refuses files. gmsh takes every file for a script that it does
-/// not recognise, and its scripts can run commands and write files. A new process ends the mesher with SIGSYS, so that
+/// The sandbox: seccomp refuses system calls, Landlock refuses files. Files that gmsh does not recognise are scripts to
+/// it, which can run commands and write files. A new process ends the mesher with SIGSYS, so that
 /// a command is a message and not a mesh without it. The other calls fail, because libraries make some of them for
 /// reasons of their own.
 #include "squeal/base/available_memory.hpp"

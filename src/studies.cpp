@@ -56,8 +56,8 @@ Attractors run_attractors(const SlidingPoint& point, const Motion& motion, const
     return reason.empty() ? attractors({point.modes.unstable(), point.estimates})
                           : not_run<Attractors>(OutcomeKind::skipped, reason);
   }
-  // a motion may go on beside a stable equilibrium: from the mode that decays slowest, or that a given start has most
-  // of, and from random sums of modes
+  // A motion may go on beside a stable equilibrium. Starts are the mode that decays slowest, or that a given start has
+  // most of, and random sums of modes.
   const std::size_t followed = motion.followed.index;
   const Estimate estimate = estimate_amplitude(point.sliding(), *point.linearised, modes[followed]);
   if (!std::isfinite(estimate.start_amplitude))

@@ -18,8 +18,8 @@ struct MotionStart
 /// The start that the scene names: a file, or the end of the transient. Error: as of read_state.
 MotionStart motion_start(const SlidingPoint& point, const Scene& scene, const Trajectory& transient);
 
-/// Finds the cycle, and where none attracts the motion that is settled on. "auto" goes through the ways again at four
-/// times the steps a period, while these may decide and are affordable.
+/// Finds the cycle, and where none attracts the motion that is settled on. With "auto" the ways are gone through again
+/// at four times the steps a period, while these may decide and are affordable.
 Motion find_motion(const SlidingPoint& point, const MotionStart& start, const Scene& scene,
                    const ProgramOptions& options, const StageRunner& run);
 

@@ -45,8 +45,8 @@ SlidingPoint find_sliding(const Model& model, const ProgramOptions& options, con
 SlidingPoint with_small_motions(SlidingPoint point, const Scene& scene, const ProgramOptions& options,
                                 const StageRunner& run);
 
-/// The unstable modes. Where none is, and the cycle is sought from a state that the scene gives, the one that decays
-/// slowest: a cycle may attract beside a stable equilibrium.
+/// The unstable modes. Where none is, and the scene gives a state for the cycle, the one that decays slowest. A cycle
+/// may attract beside a stable equilibrium.
 std::span<const ComplexMode> followed_modes(const SlidingPoint& point, const Scene& scene);
 
 /// Estimates the amplitude of one mode.
@@ -68,8 +68,8 @@ std::string no_mode_to_follow(const SlidingPoint& point, const Scene& scene);
 bool seeks_modes(const Scene& scene);
 
 /// The number of starts whose motions are sought: that of the scene. Else, where it costs little, each of several
-/// growing modes, their pairs, random sums and a small motion; beside stable sliding with falling friction the mode and
-/// random sums. Nothing: none are sought.
+/// growing modes, their pairs, random sums and a small motion. Beside stable sliding with falling friction, the mode
+/// and random sums. Nothing: none are sought.
 std::optional<int> starts_sought(const SlidingPoint& point, const Scene& scene);
 
 /// Why a stage is off; empty where the scene asks for it, or the point does. `point`: as far as the stages before know

@@ -31,7 +31,7 @@ struct AmplitudeRange
 };
 
 /// A tenth to twice the largest estimate of an unstable mode. Beside an equilibrium that is stable, half the first
-/// event to four times the last one: what can attract is beyond the one, and may be beyond the other.
+/// event to four times the last one. What can attract is beyond the first, and may be beyond the last.
 AmplitudeRange amplitude_range(const UnstableModes& unstable)
 {
   double amplitude = 0;
@@ -66,8 +66,8 @@ struct NamedStart
   State state;
 };
 
-/// Each unstable mode at its estimate, pairs of them, and random sums of modes up to the number asked for; behind them
-/// the small motion, where it is asked for.
+/// Each unstable mode at its estimate, pairs of them, and random sums of modes up to the number asked for. The small
+/// motion follows where it is asked for.
 std::vector<NamedStart> make_starts(const AttractorProblem& problem)
 {
   const Equilibrium& equilibrium = problem.sliding.equilibrium;
@@ -279,8 +279,8 @@ bool all_settled(const std::vector<ReachedMotion>& motions, long periods)
                       });
 }
 
-/// Adds to the bars of motions what half as many steps a period change, from where each one's first start has ended,
-/// over as many periods. One step more keeps motions that each take a whole number of steps from agreeing.
+/// Adds to the bars of motions what half as many steps a period change. Each is marched from where its first start has
+/// ended, over as many periods. One step more keeps motions that each take a whole number of steps from agreeing.
 /// One whose periods are alike to rounding takes such a number, and holds half a step.
 void add_step_errors(const Swarm& swarm, long periods, std::vector<ReachedMotion>& motions)
 {

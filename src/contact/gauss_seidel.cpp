@@ -118,8 +118,8 @@ template <class Entry> Swept agree(const SweptProblem<Entry>& problem, bool move
   return swept;
 }
 
-/// The sweeps stop below the tolerance, or where rounding of dw or what the near field leaves out hides the rest. dw is
-/// as large as the residual at first.
+/// The sweeps stop below the tolerance, or where rounding of dw or what the near field leaves out hides the rest. At
+/// first dw is as large as the residual.
 template <class Entry> void set_target(SweptProblem<Entry>& problem, const ContactSettings& settings)
 {
   const double digits = 32 * static_cast<double>(std::numeric_limits<Entry>::epsilon());

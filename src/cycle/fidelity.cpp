@@ -71,8 +71,8 @@ struct FineShooting
   double accuracy = 0;
   bool exact = false; // steps of the iteration
 
-  /// Shoots until what further steps would change is below half of the accuracy; where the steps are exact below a
-  /// twentieth, unless that stalls: cycles on two grids are compared.
+  /// Shoots until what further steps would change is below half of the accuracy. Where the steps are exact, below a
+  /// twentieth unless that stalls, since cycles on two grids are compared.
   LimitCycle cycle_near(const Owned<Vec>& state, double period, int steps, const Convergence& before)
   {
     const int own = std::exchange(problem.settings.steps_per_period, steps);
@@ -189,8 +189,8 @@ void cut_short(FittedCycle& found)
   found.fidelity.reason = format("the run was ended at %d steps a period", found.cycle.steps_per_period);
 }
 
-/// Takes a converged cycle to twice as many steps a period; where these are still too few, to as many as the errors of
-/// both foretell. Where the accuracy is not reached, the finest cycle stands with its errors, and its reason says so.
+/// Takes a converged cycle to twice as many steps a period. Where these are too few, to as many as the errors of both
+/// foretell. Where the accuracy is not reached, the finest cycle stands with its errors, and its reason says so.
 /// Where the run is asked to end meanwhile, the cycle that was found stays.
 void refine_steps(CycleProblem& problem, const CycleOptions& options, FittedCycle& found)
 {

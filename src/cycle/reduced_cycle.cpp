@@ -76,7 +76,7 @@ double highest_joining(const ReducedSearch& search)
   return factor * search.problem.unstable.modes.front().frequency_hz();
 }
 
-/// Attachments at most. The start of a search on the full model needs no more than the vectors of its multipliers do; a
+/// Attachments at most. The start of a search on the full model needs no more than the vectors of its multipliers. A
 /// cycle that is the answer needs all.
 PetscInt attachments_of(const ReducedSearch& search)
 {

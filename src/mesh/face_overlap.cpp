@@ -212,7 +212,7 @@ bool oppose(const SlaveInPlane& slave, const PlacedFace& master, const NodePosit
 
 } // namespace
 
-/// A Bernstein polynomial of degree 2 at a node is a chance: two corners are drawn from those around the node, and the
+/// A Bernstein polynomial of degree 2 at a node is a chance. Two corners are drawn from those around the node; the
 /// polynomial's node is in their middle.
 const FaceMatrix& multiplier_factors(Shape shape)
 {

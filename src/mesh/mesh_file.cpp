@@ -2,7 +2,7 @@
 /// its answer read from a pipe.
 ///
 /// The mesher is spawned and not forked: a fork would copy the memory that MPI has registered. Its environment has no
-/// variables of MPI or of a scheduler's launcher, so that no library in it takes itself for a rank of this run.
+/// variables of MPI or of a scheduler's launcher. So no library in it takes itself for a rank of this run.
 #include "squeal/mesh/mesh_file.hpp"
 
 #include "squeal/base/error.hpp"

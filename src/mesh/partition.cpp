@@ -1,7 +1,7 @@
 /// Partition of the mesh by METIS (Karypis and Kumar 1998).
 ///
-/// Graph: two nodes are neighbours when an element has both. The slave node of a contact pair and the master node of
-/// largest weight are merged into one vertex, so that both have the same owner. The weight of a vertex is the number of
+/// Graph: two nodes are neighbours when an element has both. A contact pair's slave node and its master node of largest
+/// weight are merged into one vertex. So both have the same owner. The weight of a vertex is the number of
 /// its nodal degrees of freedom.
 #include "squeal/mesh/contact_pairs.hpp"
 

@@ -5,7 +5,7 @@
 /// divided along its shortest diagonal. A pyramid's holds one that stands on its apex, and a tetrahedron at each side.
 ///
 /// A new node lies where the parent's shape functions N put it, x = sum of N_i x_i, also on curved sides. Its N is zero
-/// but for nodes of the corner, side or face that it is on, so neighbours agree on the same N_i, which name the node.
+/// but for nodes of the corner, side or face that it is on. So neighbours agree on the same N_i, which name the node.
 /// All N are multiples of powers of two, hence exact, but within a pyramid. The middles of straight edges and faces
 /// that gmsh meshed on a curved geometry lie on it instead. Caveat: in the first division alone.
 #include "squeal/base/error.hpp"

@@ -67,8 +67,8 @@ Extension extend(Orthonormal& basis, Index count, double threshold, Index at_mos
   image.noalias() = E * columns;
   const MatrixXd fresh = columns.transpose() * image;
   const auto [sizes, directions] = solve_dense_symmetric((fresh + fresh.transpose()) / 2);
-  // a part that is negative, or below the rounding of earlier directions, is nothing new; that bound is far too wide
-  // where such a direction came with hardly anything
+  // A part that is negative, or below the rounding of earlier directions, is nothing new. That bound is far too wide
+  // where such a direction came with hardly anything.
   constexpr double widest = 1e-9;
   const double of_sums = static_cast<double>(E.rows()) * std::numeric_limits<double>::epsilon();
   const double rounding = std::max(-sizes.minCoeff(), std::min(of_sums / basis.smallest, widest));

@@ -15,8 +15,8 @@ namespace squeal
 MultiVector mode_columns(const std::vector<ComplexMode>& modes, const Reduction& reduction,
                          const ClosedContact& contact);
 
-/// The force of each active pair that slides, one column each: its normal force and the friction that follows it, on
-/// the active pairs' rows of B.
+/// The force of each active pair that slides, a column each: its normal force and friction, on the active pairs' rows
+/// of B.
 Eigen::SparseMatrix<double> sliding_forces(const Interface& interface, const std::vector<int>& active);
 
 /// P = F'B Z of the forces F, columns on the active pairs' rows.

@@ -49,8 +49,8 @@ MotionVerdict judge_irregular(std::span<const double> energies)
                  needed)};
 }
 
-/// Whether the energies of periods of so many rounds are one value within what is asked of a cycle's energy by default
-/// (accuracy), and do not part from it. Two frequencies of a torus are near one of the fractions up to q by chance,
+/// Whether the energies of periods of so many rounds are one value and do not part from it. The bound is that asked of
+/// a cycle's energy by default (accuracy). Two frequencies of a torus are near one of the fractions up to q by chance,
 /// which are as many as q^2.
 bool steady(std::span<const double> energies, int rounds)
 {
@@ -163,8 +163,8 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
                                   [](const MeanValue& one) { return std::abs(one.value) <= together * one.error; });
   if (any_grows(exponents)) return judge_irregular(energies);
   const bool one_frequency = base.second == 0 || base.closes_after > 0;
-  // slow motions that die out have exponents within their bars of zero, too; a torus of hardly coupled parts has as
-  // steady energies, and the second frequency tells
+  // Slow motions that die out have exponents within their bars of zero, too. A torus of hardly coupled parts has as
+  // steady energies: the second frequency tells.
   if ((zero == 1 && (base.second == 0 || parted(exponents, together))) ||
       (zero > 0 && steady(energies, base.closes_after) && one_frequency))
     return {MotionKind::periodic, "", ""};

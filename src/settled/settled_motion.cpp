@@ -221,9 +221,9 @@ double nearest_line(const Spectrum& spectrum, double frequency)
   return nearest == spectrum.lines.end() ? frequency : nearest->frequency_hz;
 }
 
-/// Sets what half as many steps a period change, from where the motion ends: the mean fluctuating energy, and as part
-/// of their bars the frequencies of lines. Seen is the second half of as many windows as cost a quarter of the motion's
-/// own.
+/// Sets what half as many steps a period change from where the motion ends. These are the mean fluctuating energy and,
+/// as part of their bars, the frequencies of lines. Seen is the second half of as many windows as cost a quarter of the
+/// motion's own.
 void add_step_errors(const Windows& windows, Vec end, SettledMotion& motion)
 {
   const CycleProblem& problem = windows.problem;
@@ -247,8 +247,8 @@ void add_step_errors(const Windows& windows, Vec end, SettledMotion& motion)
     if (std::isfinite(part)) line.frequency_error += part * line.frequency_hz;
 }
 
-/// The largest exponent with four times as many steps a period, from where the motion ends, over as many windows as
-/// cost a quarter of what the motion did, or 32. Its first quarter is left out, where the tangent turns to what grows
+/// The largest exponent with four times as many steps a period, from where the motion ends. Its windows cost a quarter
+/// of what the motion did, or are 32. Its first quarter is left out, where the tangent turns to what grows
 /// most.
 MeanValue exponent_by_finer_steps(const Windows& windows, const SettledMotion& motion, Vec end)
 {
@@ -269,7 +269,7 @@ MeanValue exponent_by_finer_steps(const Windows& windows, const SettledMotion& m
   return exponents_of(bundle, count / 4, motion.examined.period / windows.length).front();
 }
 
-/// An exponent above zero is of the grid of time where four times as many steps change it by more than both bars and a
+/// An exponent above zero comes from the grid of time where four times as many steps change it beyond both bars and a
 /// tenth. Masses that contact hits within steps, or feet without mass, scatter a regular motion.
 void hold_against_finer_steps(const Windows& windows, Vec end, SettledMotion& motion)
 {

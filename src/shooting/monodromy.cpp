@@ -233,7 +233,7 @@ namespace
 {
 
 constexpr Index of_block = 6; // columns
-// Few powers of few motions may be bounded where another one grows: the residual of a Ritz value says nothing of what
+// Few powers of few motions may be bounded where another one grows. The residual of a Ritz value says nothing of what
 // the space has not. Four blocks have seen what every motion of a random start becomes in four periods.
 constexpr long least_blocks = 4;
 

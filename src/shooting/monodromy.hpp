@@ -86,8 +86,8 @@ struct WholeSpace
 };
 
 /// All motions but velocities without mass, on which none depends. A theta step carries those along as (v_theta - (1 -
-/// theta) v)/theta, so that they have multipliers of their own, [-(1 - theta)/theta]^N a period of N steps: 1 in
-/// modulus at theta = 1/2. Motions along offsets that are held in the period recorded last are left out, too: each has
+/// theta) v)/theta. Their multipliers are [-(1 - theta)/theta]^N a period of N steps, 1 in modulus at theta = 1/2.
+/// Motions along offsets that are held in the period recorded last are left out, too: each has
 /// a multiplier 1. Collective.
 WholeSpace whole_space(const Flow& flow, double period);
 
@@ -131,8 +131,8 @@ struct DeflatedSearch
 /// Takes from each column what is known.
 using Deflation = std::function<void(StateBlock&)>;
 
-/// Searches from random velocities, with at most `columns` columns beyond the first block, until the largest value is
-/// bounded or known well enough for a projection to go on from. Collective.
+/// Searches from random velocities, with at most `columns` columns beyond the first block. It ends when the largest
+/// value is bounded, or a projection can go on from it. Collective.
 DeflatedSearch search_beside(const Monodromy& monodromy, const Deflation& deflation, Eigen::Index columns);
 
 } // namespace squeal

@@ -13,8 +13,8 @@ namespace squeal
 namespace
 {
 
-/// All multipliers. Their bars are what a grid moved by half a step and one of twice as many change; those of real
-/// multipliers hold by how much that of the shift in time misses 1.
+/// All multipliers. Their bars are what a grid moved by half a step and one of twice as many change. Bars of real
+/// multipliers hold by how much the shift in time misses 1.
 FloquetAnalysis from_whole_matrix(const Monodromy& monodromy)
 {
   FloquetAnalysis result;

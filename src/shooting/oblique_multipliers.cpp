@@ -150,8 +150,8 @@ bool repels(const Passes& passes)
   return is_above(passes, passes.bars);
 }
 
-/// The pairs that decide: the largest, and those whose bars reach across 1 unless another one is above it by more than
-/// the grid of time may change. That one may decide `alone`, once it has settled.
+/// The pairs that decide: the largest, and those whose bars reach across 1. One above 1 by more than the grid of time
+/// may change leaves the latter out. That one may decide `alone`, once it has settled.
 std::vector<std::size_t> deciding_pairs(const Passes& passes, bool alone)
 {
   const bool may_decide = alone ? is_above(passes, passes.grid) : repels(passes);
@@ -324,8 +324,8 @@ std::string missing_beside(const DeflatedSearch& search)
                 std::abs(search.pair.lambda), search.residual);
 }
 
-/// The passes, and the search beside them. What that finds joins Q: a motion that the reduced model has not becomes one
-/// of the pairs, and what comes of pairs that have not settled goes. Returns why the vectors do not serve, or nothing.
+/// The passes, and the search beside them. What that finds joins Q. A motion that the reduced model has not becomes one
+/// of the pairs; what comes of pairs that have not settled goes. Returns why the vectors do not serve, or nothing.
 std::string make_complete(const Monodromy& monodromy, const SlowMotions& slow, Index columns, Passes& passes,
                           std::string& missing, long& searched)
 {

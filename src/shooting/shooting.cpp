@@ -13,8 +13,8 @@ namespace squeal
 namespace
 {
 
-// The paper's shooting on a subspace (src/README.md, section 6.4), unknowns y = (T, c) of x = x_k + E c. f and the
-// anchor are those of the last Jacobian: the Newton correction is orthogonal to the flow where it starts. Everything is
+// The paper's shooting on a subspace (src/README.md, section 6.4), unknowns y = (T, c) of x = x_k + E c. The anchor and
+// f are those of the last Jacobian: the Newton correction is orthogonal to the flow where it starts. Everything is
 // scaled by the fluctuation, so that y and R are of order one. With the paper's three shapes there are seven unknowns,
 // all on rank 0. Newton is SNES's; GMRES solves for its steps by columns of the exact tangent.
 //
@@ -185,8 +185,8 @@ Owned<SNES> make_solver(MPI_Comm comm, PetscInt iterations, double tolerance)
 }
 
 /// Damped Newton (options -cycle_snes_...) on T and the coordinates in the subspace of the shapes. Before a finish only
-/// a better orbit is taken; one that falls onto the equilibrium never is, since the projected residual can only be
-/// small there.
+/// a better orbit is taken. One that falls onto the equilibrium never is: the projected residual can only be small
+/// there.
 Orbit shoot_on_shapes(const OrbitProblem& problem, const ShootingOptions& options, ConvergenceLog& log, Orbit start,
                       const std::vector<Vec>& shapes)
 {
@@ -299,9 +299,9 @@ bool leaves_too_slowly(const Search& search, const Attempt& attempt, int done)
   return std::log(10) > left * std::log(std::max(std::abs(values.front()), 1.));
 }
 
-/// Goes on integrating for 20, 40, 80 … periods, and shoots again after each or as soon as the motion returns three
-/// times better than where the last attempt started. The motion goes on by itself; once, from beside an orbit that
-/// repels. Sets `free` to where it ends.
+/// Goes on integrating for 20, 40, 80 … periods, and shoots again after each. It does so earlier where the motion
+/// returns three times better than where the last attempt started. The motion goes on by itself; once, from beside an
+/// orbit that repels. Sets `free` to where it ends.
 Attempt search_on(const Search& search, Attempt best, int done, Orbit& free)
 {
   const auto& [problem, options, log, start] = search;

@@ -44,7 +44,7 @@ SeenGrowth fit_growth(const std::vector<double>& logarithms)
 }
 
 /// Distances from an orbit, without their part along the flow. The states of a motion along a complex pair turn on an
-/// ellipse, on which they would come nearer and go away again whatever the pair does. So the ellipse is made a circle:
+/// ellipse. There they would come nearer and go away again whatever the pair does. So the ellipse is made a circle:
 /// x = Re(z (r + i s)) + rest is |z| |r| and |rest| away, at a right angle.
 class Distance
 {
@@ -146,8 +146,8 @@ bool is_left_open_by_one(const Multipliers& multipliers)
   return true;
 }
 
-/// The growth of the distance from the orbit, for motions that start at smaller and smaller parts of the fluctuation,
-/// largest first, until it agrees with the deciding multiplier. An unstable orbit takes one start.
+/// The growth of the distance from the orbit, until it agrees with the deciding multiplier. Motions start at smaller
+/// and smaller parts of the fluctuation, largest first. An unstable orbit takes one start.
 std::vector<SeenGrowth> growths_beside(const OrbitProblem& problem, ConvergenceLog& log, const Orbit& orbit,
                                        const FloquetAnalysis& floquet, long periods)
 {

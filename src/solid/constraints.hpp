@@ -39,7 +39,7 @@ struct FreeSum
 };
 
 /// Adds factor * u(nodal_dof), by the free ones that it depends on. A dependent degree of freedom may depend on
-/// another, as the rotation of a joint on the solid nodes of a rigid body, but never on itself.
+/// another, as a joint's rotation on the solid nodes of a rigid body. It never depends on itself.
 void add_expanded(const Constraints& constraints, PetscInt nodal_dof, double factor, FreeSum& sum);
 
 void make_dependent(Constraints& constraints, PetscInt nodal_dof, std::vector<ConstraintTerm> terms);

@@ -3,8 +3,7 @@
 /// Rigid body:       u = u_ref + theta x (x - x_ref); the rotations of a shell node are theta.
 /// Tie:              a slave node follows nodes of the master (squeal/mesh/contact_pairs.hpp).
 /// Coupling, joint, support in a frame: rows of their own (constraints.hpp).
-/// Shell on a solid: a node of both rotates with the solid nodes around it, those of the solid elements that hold it,
-/// by
+/// Shell on a solid: a node of both rotates with the solid nodes of the elements that hold it, by
 ///                   their least-squares rotation
 ///                   theta = I^-1 sum r_i x u_i,   r_i = x_i - mean x,   I = sum |r_i|^2 1 - r_i r_i^T,
 ///                   which is exact for rigid motions. The moment of the shell then acts on the solid nodes as the

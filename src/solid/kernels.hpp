@@ -66,8 +66,8 @@ inline double positive_jacobian(double determinant, std::size_t point)
   throw std::runtime_error(text.str());
 }
 
-/// Returns the matrices of a solid, or of a shell, with nodes at the columns of X [m]; a shell's middle surface is at
-/// the arms [m] from them.
+/// Returns the matrices of a solid or shell with nodes at the columns of X [m]. A shell's middle surface is at the arms
+/// [m] from them.
 ElementMatrices solid_matrices(Shape shape, const NodePositions& X, const Material& material);
 ElementMatrices shell_matrices(Shape shape, const NodePositions& X, const NodePositions& arms, const Material& material,
                                double thickness);

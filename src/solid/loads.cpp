@@ -1,8 +1,8 @@
 /// The load on the free degrees of freedom. It is T' f: a force is shared equally by its nodes; a pressure p is -p
 /// times the integral of N_i n dA, n outward. The share of a fixed degree of freedom is carried by its support.
 ///
-/// Beside T q a nodal degree of freedom may have a motion s that is known: what a support prescribes, or the shortening
-/// of a bolt, which the elements on one side of its section see. Its load is -T' K s; that of gravity is T' M a.
+/// Beside T q a nodal degree of freedom may have a known motion s. A support prescribes it, or it is a bolt's
+/// shortening, which the elements on one side of its section see. Its load is -T' K s; that of gravity is T' M a.
 #include "contributions.hpp"
 #include "squeal/base/error.hpp"
 #include "squeal/mesh/shape_functions.hpp"

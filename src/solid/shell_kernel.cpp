@@ -1,4 +1,4 @@
-/// Flat shells: membrane with drilling rotation and plate in the element's plane,
+/// Flat shells: membrane with drilling rotation, and plate,
 ///     D = diag(h C, G h, h^3/12 C, kappa G h I),
 /// with C of plane stress, h the thickness, G the shear modulus and kappa = 5/6 the shear correction.
 ///
@@ -193,8 +193,8 @@ template <int n> struct Facet
   Eigen::Matrix<double, 3, n> arms; // [m] from the nodes to their places in the plane, in global axes
 };
 
-/// Returns the plane of an element whose middle surface is at these arms from its nodes; its x is the projection of the
-/// first side on the plane.
+/// Returns the plane of an element whose middle surface is at these arms from its nodes. Its x is the first side's
+/// projection on the plane.
 template <int n> Facet<n> make_facet(const NodePositions& nodes, const NodePositions& arms)
 {
   const NodePositions X = nodes + arms;

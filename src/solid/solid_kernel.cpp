@@ -11,8 +11,8 @@
 /// motion the frequency of a bent element is wrong by (k L)^2 / 12.
 ///
 /// Caveats: wedge6 is stiff in bending within the plane of its triangles, as the constant-strain triangle is; it is for
-/// filling, not for beams. tet4 has constant strains and is stiff in all bending; pyramid5 is nearly so. hex8 is exact
-/// in bending as a parallelepiped and stiffer when tapered (MacNeal 1987), as all 8-node bricks are.
+/// filling, not for beams. With constant strains tet4 is stiff in all bending; pyramid5 is nearly so. As a
+/// parallelepiped hex8 is exact in bending, and stiffer when tapered (MacNeal 1987), as all 8-node bricks are.
 #include "kernels.hpp"
 #include "squeal/mesh/shape_functions.hpp"
 

@@ -20,8 +20,8 @@ struct OneStep
 /// together.
 PairFriction scaled(const Interface& interface, double factor);
 
-/// Statuses of a step's end, from its reactions, its law, its factor on the drive and `velocity`, B v, which a law
-/// without a decay speed does not look at.
+/// Statuses of a step's end, from its reactions, its law, its factor on the drive and `velocity`, B v. A law without a
+/// decay speed does not look at the last.
 std::vector<ContactStatus> status_with(const Interface& interface, const PairFriction& friction, double drive,
                                        const std::vector<double>& reactions, std::vector<double> velocity);
 

@@ -1,4 +1,4 @@
-/// A column is a motion without load and drive whose contact is linear: with M dv, A dv and K du at hand a step solves
+/// A column is a motion without load and drive whose contact is linear. With M dv, A dv and K du at hand a step solves
 ///     A dv_f = [M dv - (1-theta) A dv]/theta - h K du,      A dv+ = A dv_f + h B' dr,
 /// and A dv+ is the right-hand side just solved for, as in the step itself.
 #include "squeal/algebra/multivector.hpp"

@@ -2,8 +2,8 @@
 ///
 /// With M v and A v of the current state at hand, the explicit matrix needs no product of its own,
 ///     M - h(1-theta) C - h^2 theta(1-theta) K = [M - (1-theta) A]/theta,
-/// and A v+ is the right-hand side just solved for: a step multiplies by M and K once each. The same vectors give the
-/// energies and, from (A - M) v_theta = h theta C v_theta + theta^2 h (K u+ - K u), the damping work.
+/// and A v+ is the right-hand side just solved for. So a step multiplies by M and K once each. The same vectors give
+/// the energies and, from (A - M) v_theta = h theta C v_theta + theta^2 h (K u+ - K u), the damping work.
 #include "squeal/algebra/multivector.hpp"
 #include "squeal/base/free_memory.hpp"
 #include "step_contact.hpp"

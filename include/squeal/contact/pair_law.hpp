@@ -299,8 +299,8 @@ enum class ContactStatus : char
 
 /// A closed pair sticks where its friction stays inside the Coulomb disc of rest by more than 1e-8 of the largest
 /// normal reaction of its contact. Where mu depends on the speed, friction of slip may be inside that disc too. A pair
-/// then sticks only if its sliding speed w_t is below 1e-5 of the speed over which the law changes, and its friction
-/// inside the disc of that speed, too.
+/// then sticks only if its friction is inside the disc of its sliding speed w_t as well. That speed must be below 1e-5
+/// of the speed over which the law changes.
 ContactStatus contact_status(const PairVector& r, const PairVector& w, const FrictionLaw& law, double largest);
 
 /// `w`: contact velocities, which are read where mu depends on the speed; may be empty elsewhere.

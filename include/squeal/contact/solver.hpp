@@ -4,10 +4,10 @@
 /// - rho w)| with rho = 1/W_ii. It is over the largest reaction, or over rho max|b| where that is smaller, and always
 /// of W itself in double precision.
 ///
-/// gauss_seidel: one exact local solve a pair and sweep. w follows each change of a reaction; pairs that no longer
-/// move are passed over. A large W is swept over through its near field, in single precision, by several ranks side by
-/// side: each then learns what the others changed. One product with W between sweeps and the verdict closes the
-/// residual. Where that does not help, the sweeps read W itself. From the fifth on they are combined (Anderson).
+/// gauss_seidel: one exact local solve a pair and sweep. Each change of a reaction is followed by w; pairs that no
+/// longer move are passed over. A large W is swept over through its near field, in single precision, by several ranks
+/// side by side: each then learns what the others changed. One product with W between sweeps and the verdict closes
+/// the residual. Where that does not help, the sweeps read W itself. From the fifth on they are combined (Anderson).
 /// fixed_point: the paper's; without friction it contracts for 0 < rho < 2/lambda_max(W), at a rate set by cond(W).
 ///
 /// Caveat: neither is sure to converge where mu couples sliding and pressure strongly; the result says so.

@@ -5,9 +5,9 @@
 /// outgrows the amplitude that its active pairs were chosen for, they are chosen again. Then it is shot at. Its cycle
 /// is the start on the full model.
 ///
-/// "reduced": a period of the full model gives the reduced cycle's error, a cycle at twice as many steps the step's.
-/// "auto": what the scene gives is kept. Where it leaves the steps open, the full model's cycle is found at few, and
-/// its verdict is given there. Two further numbers of steps give the error of the step and the number that the
+/// Of "reduced", a period of the full model gives the reduced cycle's error, a cycle at twice as many steps the step's.
+/// With "auto" what the scene gives is kept. Where it leaves the steps open, the full model's cycle is found at few,
+/// and its verdict is given there. Two further numbers of steps give the error of the step and the number that the
 /// accuracy needs. The start is the estimate on the full model where the reduced model would not be small or has no
 /// cycle. So it is where several modes are unstable. The reduced model decides how soon this ends, not where.
 #include "squeal/cycle/limit_cycle.hpp"
@@ -64,7 +64,7 @@ struct FittedCycle
   std::optional<Outcome> on_reduced{}; // of an attempt by way of the reduced model that left it to the full one
 };
 
-/// Finds the cycle: by way of the reduced model's, where that was asked for or may do, else of the full model from the
+/// Finds the cycle: by way of the reduced model's where that was asked for or may do. Else on the full model from the
 /// problem's start. Collective. A search that fails has its outcome and reason. Error: a reduced model that was asked
 /// for cannot be made.
 FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& request, const CycleOptions& options);

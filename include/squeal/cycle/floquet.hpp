@@ -1,6 +1,6 @@
 #pragma once
-/// Floquet multipliers of a brake's cycle (src/README.md, section 6.9). The approximate right and left vectors that the
-/// oblique projection needs come from a reduced model on the contact of one recorded period of the full one.
+/// Floquet multipliers of a brake's cycle (src/README.md, section 6.9). The oblique projection needs approximate right
+/// and left vectors. They come from a reduced model on the contact of one recorded period of the full one.
 #include "squeal/cycle/limit_cycle.hpp"
 
 #include <memory>
@@ -8,8 +8,7 @@
 namespace squeal
 {
 
-/// The steps a period of a recording that tells the error of another, and the part of a change on it that is taken for
-/// that.
+/// A recording tells the error of another: its steps a period, and the part of a change on it that is the error.
 struct OtherSteps
 {
   int steps = 0; // 0: none is made
@@ -24,7 +23,7 @@ recorded_model(const CycleProblem& problem, std::span<const std::vector<StepReco
 /// Gives the flow the slow motions of the map. Errors hold what these other steps change. Borrows problem and map.
 void add_slow_motions(const CycleProblem& problem, PeriodMap& map, const OtherSteps& other, Flow& flow);
 
-/// Twice as many and one more, which place each event at other points of its step: contact that hits or sticks has an
+/// Twice as many and one more, which place each event at other points of its step. Contact that hits or sticks has an
 /// error of first order. Where periods are dear, twice as many of few, by a step's order 2, or none. Collective.
 OtherSteps steps_to_compare(const Structure& structure, int steps);
 

@@ -5,8 +5,8 @@
 /// The others, the active ones, keep unilateral contact and Coulomb friction. Then y = V q, V dense:
 ///     M q'' + C q' + K q = H r + f,   f = -H r0,   M = (Y V)'M (Z V) ...,  H = (Y V)'B_a',
 ///     g = g0 + G_n q >= 0,   s = G_t q' - v_d,   G = B_a Z V,
-/// all three matrices unsymmetric. V holds the complex modes of the band, so that the reduced model has exactly their
-/// growth rates, real modes above it, and of the active pairs' attachments (section 7.2) the part that is new.
+/// all three matrices unsymmetric. V holds the complex modes of the band, whose growth rates the reduced model has
+/// exactly, and real modes above it. Of the active pairs' attachments (section 7.2) it holds the part that is new.
 ///
 /// An active pair that slides along the drive e throughout has one row and one shape instead of three. They are of B_n'
 /// + mu B_t'e, the normal force with its friction.

@@ -84,8 +84,7 @@ std::vector<std::filesystem::path> inputs_of(const Scene& scene);
 /// Whether two names are of one file, which may not exist yet.
 bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b);
 
-/// Error: an output of the scene, or a result in this place, would fall on what the run reads, on another output or on
-/// a folder.
+/// Error: an output of the scene, or a result here, would fall on what the run reads, another output or a folder.
 void check_outputs(const Scene& scene, const std::vector<std::filesystem::path>& inputs,
                    const std::filesystem::path& place);
 

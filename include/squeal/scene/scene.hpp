@@ -308,7 +308,7 @@ struct Scene
   std::vector<UncertainNumber> uncertain;
 };
 
-/// Returns the scene in a TOML file after the overrides "table.key=value", whose values are TOML or bare words.
+/// Returns the scene in a TOML file after the overrides "table.key=value", whose values are TOML or bare words. The key
 /// "part.NAME.key" reaches the entry with that name in a list, "contact.0.key" the entry with that index. Paths become
 /// absolute; they are relative to the scene file.
 /// Throws Error for every wrong key, type, sign and range, with file, line, key, value, remedy and the nearest known
@@ -337,7 +337,7 @@ std::vector<std::string> scene_key_names();
 bool has_preload(const Scene& scene);
 
 /// How a matrix scene names degrees of freedom: by the rows of its matrices, or by the nodes of the code they are from.
-/// "dof:7" is a row of the matrices, "node:1017" all rows of a node; lists and ranges are "node:3,8,20-40".
+/// Thus "dof:7" is a row of the matrices, "node:1017" all rows of a node; lists and ranges are "node:3,8,20-40".
 struct RowNames
 {
   struct Range

@@ -150,7 +150,7 @@ struct ObservedMotion
 };
 
 /// A motion, what is measured on it and its kind. Its period is that of its strongest line, or the multiple after which
-/// it closes; a window, which may be of any length, where fewer than 16 of these were seen.
+/// it closes. Where fewer than 16 of these were seen, it is a window of any length.
 struct ExaminedMotion
 {
   std::size_t windows = 0;                   // integrated

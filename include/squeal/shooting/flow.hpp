@@ -42,8 +42,8 @@ struct TimeGrid
   int steps(int of_flow) const { return finer * of_flow; }
 };
 
-/// The motion in a period of a system's offsets: displacements that stay as they are while friction holds them, and
-/// that nothing leads back (src/README.md, section 6.13).
+/// The motion in a period of a system's offsets (src/README.md, section 6.13). These are displacements that friction
+/// holds and that nothing leads back.
 struct OffsetMotion
 {
   double slip = 0;  // [m] the largest way of one that moves one way alone

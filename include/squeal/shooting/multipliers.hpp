@@ -53,8 +53,8 @@ struct ShootingOptions
 // approximate right and left vectors that the flow knows. Both use the flow's exact tangent. The shift in time, whose
 // multiplier is 1, is the value near 1 whose vector is closest to d.
 //
-// Each multiplier has an error bar of its own. In a whole matrix none of a real positive one is smaller than the
-// distance of the shift's own multiplier from 1; a projection's bars do not hold that.
+// Each multiplier has an error bar of its own. The shift's own multiplier misses 1 by a distance. In a whole matrix no
+// bar of a real positive one is smaller; a projection's bars do not hold that.
 //
 // Caveat: a projection may lack a motion that grows. What is done about that makes it unlikely.
 

@@ -25,10 +25,10 @@ Verdict judge(const OrbitProblem& problem, const ShootingOptions& options, Conve
 /// less energy.
 Owned<Vec> state_beside(const OrbitProblem& problem, const Orbit& orbit, Vec fastest, double part);
 
-/// Decides an open verdict: "unstable" where a motion was seen to grow beyond its own bar, "stable" where one was seen
-/// to decay and only one multiplier's bar held 1. "Stable" is undecided where no motion was seen to decay, "unstable"
-/// where none was seen to grow. Where contact only just opens, closes or sticks, no motion stays where the tangent
-/// holds. Not collective.
+/// Decides an open verdict. It is "unstable" where a motion was seen to grow beyond its own bar. It is "stable" where
+/// one was seen to decay and only one multiplier's bar held 1. A verdict "stable" is undecided where no motion was seen
+/// to decay, and "unstable" where none was seen to grow. Where contact only just opens, closes or sticks, no motion
+/// stays where the tangent holds. Not collective.
 void decide_by_growth(const std::vector<SeenGrowth>& seen, Multipliers& multipliers);
 
 /// An orbit that repels is no answer; with other unstable modes the motion need not be periodic at all. Not collective.

@@ -37,8 +37,8 @@ std::vector<std::vector<double>> read_vectors(const std::filesystem::path& file)
 /// Appends a vector with its header.
 void append_vector(const std::vector<double>& entries, std::string& bytes);
 
-// Rows of a matrix scene: which motions of which nodes they are, and what the scene adds to the matrices of the files:
-// damping, forces, probes, supports.
+// Rows of a matrix scene: which motions of which nodes they are. The scene adds damping, forces, probes and supports to
+// the matrices of the files.
 
 /// The rows of the files of a matrix scene, the same on every rank.
 struct MatrixRows

@@ -3,7 +3,7 @@
 ///
 /// hex8, wedge6: incompatible modes in Taylor's corrected form. Both pass the patch test on any shape; hex8 does not
 ///     lock in bending, wedge6 does and is for filling.
-/// Others: isoparametric, with full integration. tet4 and pyramid5 lock in bending.
+/// Others: isoparametric, with full integration. Of these tet4 and pyramid5 lock in bending.
 /// quad4, triangle3: flat shells with transverse shear (DKMQ, DKMT) and drilling rotations, six degrees of freedom a
 ///     node. Rigid links go from the nodes to the plane of a warped quadrilateral, and to a middle surface beside them.
 /// quad8, quad9, triangle6: shells that consist of these.

@@ -1,11 +1,11 @@
 #pragma once
-/// Energy estimate of the cycle's amplitude (paper, eqs. 9-19; src/README.md, section 5): the motion is taken to be
+/// Energy estimate of the cycle's amplitude (paper, eqs. 9-19; src/README.md, section 5). The motion is taken to be
 ///     u = u0 + q Re(phi e^{i w t}),  w = Im(lambda),
 /// and q is sought for which the interface gives what the damping takes, P_R(q)/E = P_C/E, means over a period:
 ///     P_C = mean u'.C u',   P_R = mean sum w.(r_t - r_t0),  w = B_t u',
 ///     r_n = max(0, r_n0 + q Re(rho e^{i w t})),   r_t = -mu r_n s/|s|,   s = w - v_d:
-/// the interface force saturates by lift-off and by reversal of the sliding. rho is what this motion takes in the rows
-/// of the eliminated degrees of freedom at s = i w. It differs from the mode's own reaction, at lambda, by
+/// The interface force saturates by lift-off and by reversal of the sliding. In it rho is what this motion takes in the
+/// rows of the eliminated degrees of freedom at s = i w. It differs from the mode's own reaction, at lambda, by
 /// Re(lambda)/w.
 ///
 /// E is twice the mean kinetic energy, which is the mean energy of a free vibration. (Friction makes the mean

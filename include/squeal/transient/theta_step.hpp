@@ -146,8 +146,8 @@ struct StepReport
 StepReport advance(const ThetaStep& step, const Structure& structure, const Interface& interface, StepWork& work,
                    State& state, const StepFactors& factors = {});
 
-/// The observers of a march: records to be filled, factors at a time [s], and whether it goes on after a step; the last
-/// two may be empty.
+/// The observers of a march: records to be filled, factors at a time [s], whether it goes on after a step. The last two
+/// may be empty.
 struct StepWatch
 {
   std::span<StepRecord> records{};
