@@ -103,12 +103,6 @@ bool agree(const MeanValue& a, const MeanValue& b, double relative)
   return std::abs(a.value - b.value) <= a.error + b.error + relative * std::max(std::abs(a.value), std::abs(b.value));
 }
 
-bool same(const ReachedMotion& a, const ReachedMotion& b)
-{
-  if (a.kind != b.kind) return false;
-  return a.kind == ReachedKind::rest || agree(a, b);
-}
-
 } // namespace
 
 MeanValue frequency_of(const std::vector<double>& crossings)
@@ -161,8 +155,9 @@ std::vector<ReachedMotion> joined(std::vector<ReachedMotion> motions)
   std::vector<ReachedMotion> list;
   for (ReachedMotion& motion : motions)
   {
-    const auto known =
-        std::find_if(list.begin(), list.end(), [&](const ReachedMotion& other) { return same(motion, other); });
+    const auto is_same = [&](const ReachedMotion& other)
+    { return motion.kind == other.kind && (motion.kind == ReachedKind::rest || agree(motion, other)); };
+    const auto known = std::ranges::find_if(list, is_same);
     if (known == list.end())
       list.push_back(std::move(motion));
     else

@@ -32,27 +32,30 @@ struct CycleAtSteps
   double period = 0, energy = 0; // [s], [J]
 };
 
-/// The relative error of the last cycle's quantity, from its change since each of the others. Errors of order 2 fall
-/// alike, or depend on where in their steps pairs stick and open, so that the largest counts. Impacts have errors of
-/// order 1, which the last two changes show.
+/// The relative error of the last cycle's quantity, from its change since each of the others. Errors of order 2 depend
+/// on where in their steps pairs stick and open: their spread counts. Impacts have errors of order 1. What order 2
+/// makes of the last change is then more than before, or many cycles are needed.
 double step_error(const std::vector<CycleAtSteps>& cycles, double CycleAtSteps::*quantity)
 {
-  constexpr double alike = 1.5;
+  constexpr double of_spread = 2, more = 1.3;
+  constexpr std::size_t many = 5;
   const CycleAtSteps& last = cycles.back();
-  double first = HUGE_VAL, least = HUGE_VAL, most = 0;
-  for (const CycleAtSteps& other : std::span(cycles).first(cycles.size() - 1))
+  const std::size_t count = cycles.size() - 1;
+  double first = 0, before = 0, now = 0, squares = 0;
+  for (const CycleAtSteps& other : std::span(cycles).first(count))
   {
     const double change = std::abs(other.*quantity / (last.*quantity) - 1),
-                 ratio = static_cast<double>(other.steps) / last.steps,
-                 second = change * ratio * ratio / std::abs(1 - ratio * ratio);
-    if (&cycles.back() - &other <= 2) first = std::min(first, change * ratio / std::abs(1 - ratio));
-    least = std::min(least, second);
-    most = std::max(most, second);
+                 ratio = static_cast<double>(other.steps) / last.steps;
+    if (&cycles.back() - &other <= 2) first = std::max(first, change * ratio / std::abs(1 - ratio));
+    before = std::max(before, now);
+    now = change * ratio * ratio / std::abs(1 - ratio * ratio);
+    squares += now * now;
   }
-  return cycles.size() > 3 && most <= alike * least ? alike * most : std::max(first, most);
+  const double second = of_spread * std::sqrt(squares / static_cast<double>(count));
+  return now > more * before || cycles.size() > many ? std::max(first, second) : second;
 }
 
-/// Errors of the last of two cycles, of first order, or of the last of more, of the order that all of them show.
+/// Errors of the last of two cycles, of first order, or of the last of more, of the order that they show.
 RelativeChange step_errors_of(const std::vector<CycleAtSteps>& cycles)
 {
   return {step_error(cycles, &CycleAtSteps::period), step_error(cycles, &CycleAtSteps::energy)};
@@ -265,7 +268,6 @@ std::string find_by_reduced_model(CycleProblem& problem, const CycleOptions& opt
   ReducedSearch search{problem, options, fidelity, asked ? 3e-4 * fidelity.accuracy : 1e-3};
   ReducedCycle reduced;
   if (const std::string reason = find_first_reduced_cycle(search, reduced); !reason.empty()) return reason;
-  const double clock = MPI_Wtime();
   const Owned<Vec> state = copy_of(reduced.motion.get());
   check(VecAXPY(displacement(state), 1, problem.sliding.equilibrium.u));
   ShootingStart start{problem.sliding.equilibrium.u, displacement(state), velocity(state), reduced.period};
@@ -276,7 +278,6 @@ std::string find_by_reduced_model(CycleProblem& problem, const CycleOptions& opt
   cycle = asked ? measured_on_full_model(problem, options, start)
                 : find_cycle_from(problem, options, start, {problem.settings.tolerance});
   fidelity.full_periods = cycle.convergence.periods;
-  fidelity.full_seconds += MPI_Wtime() - clock;
   if (cycle.cut_short) return {};
   const OutcomeKind kind = cycle.outcome.kind;
   if (!asked && (kind == OutcomeKind::collapsed_to_equilibrium || kind == OutcomeKind::not_periodic))
@@ -369,18 +370,12 @@ FittedCycle find_fitted_cycle(const CycleProblem& given, const FidelityRequest& 
   {
     problem.reduced.reset();
     fidelity.used = CycleModel::full;
-    const double clock = MPI_Wtime();
     const long before = fidelity.full_periods; // of a search that stalled
     cycle = find_cycle_from_start(problem, options);
     fidelity.full_periods = cycle.convergence.periods += before;
-    fidelity.full_seconds += MPI_Wtime() - clock;
   }
   if (fidelity.chooses_steps && cycle.outcome.kind == OutcomeKind::converged && !cycle.cut_short)
-  {
-    const double clock = MPI_Wtime();
     refine_steps(problem, options, found);
-    fidelity.full_seconds += MPI_Wtime() - clock;
-  }
   fidelity.steps_per_period = cycle.steps_per_period;
   if (cycle.multipliers.stability == Stability::stable && cycle.measured.stick_pairs_max > 0 &&
       any_law(problem.sliding.interface.friction, has_two_levels))

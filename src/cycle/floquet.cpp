@@ -89,17 +89,9 @@ bool holds(const ReducedModel& model, const std::vector<PairHistory>& pairs, con
 }
 
 /// The recorded periods of a cycle: its own, one with the grid of time moved by half a step, one of other steps.
-struct RecordedPeriods
-{
-  enum
-  {
-    own,
-    moved,
-    other,
-    count
-  };
-  std::array<std::vector<StepRecord>, count> records; // that of other steps may be empty
-};
+/// That of other steps may be empty.
+constexpr std::size_t at_own = 0, at_moved = 1, at_other = 2;
+using RecordedPeriods = std::array<std::vector<StepRecord>, 3>;
 
 /// Leaves the map with its own period recorded, which the shooting may have done already.
 RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, Vec start)
@@ -110,13 +102,13 @@ RecordedPeriods record_periods(PeriodMap& map, int other_steps, double period, V
     PeriodMap other{map.sliding, map.options, other_steps, map.theta};
     other.reactions = map.reactions;
     record_period(other, period, start, {});
-    result.records[RecordedPeriods::other] = std::move(other.records);
+    result[at_other] = std::move(other.records);
   }
   record_period(map, period, start, {});
-  result.records[RecordedPeriods::own] = map.records;
+  result[at_own] = map.records;
   std::vector<StepRecord> own = std::exchange(map.records, {});
   record_period(map, period, start, {0.5});
-  result.records[RecordedPeriods::moved] = std::exchange(map.records, std::move(own));
+  result[at_moved] = std::exchange(map.records, std::move(own));
   map.recorded_start = copy_of(start);
   map.recorded_step = map.step.h;
   return result;
@@ -181,12 +173,12 @@ namespace
 /// Sets the errors of the spectrum's moduli by the grid of time: what one moved by half a step changes, and one of
 /// other steps.
 void set_grid_errors(const ReducedSpectrum& spectrum, ReducedMap& map, const OtherSteps& other, double period,
-                     const std::function<std::vector<StepRecord>(int)>& contacts, SlowMotions& slow)
+                     const std::function<std::vector<StepRecord>(std::size_t)>& contacts, SlowMotions& slow)
 {
-  add_changes(multipliers_along(spectrum, map, period, contacts(RecordedPeriods::moved)), 1, slow);
+  add_changes(multipliers_along(spectrum, map, period, contacts(at_moved)), 1, slow);
   if (other.steps == 0) return;
   ReducedMap finer{map.model, other.steps, map.theta, map.comm};
-  add_changes(multipliers_along(spectrum, finer, period, contacts(RecordedPeriods::other)), other.part, slow);
+  add_changes(multipliers_along(spectrum, finer, period, contacts(at_other)), other.part, slow);
 }
 
 SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, const OtherSteps& other, double period,
@@ -196,15 +188,12 @@ SlowMotions slow_motions_along(const CycleProblem& problem, PeriodMap& map, cons
   const RecordedPeriods periods = record_periods(map, other.steps, period, start);
   SlowMotions none;
   none.periods = other.steps > 0 ? 3 : 2;
-  const auto model = recorded_model(problem, periods.records, none.missing);
+  const auto model = recorded_model(problem, periods, none.missing);
   if (!model) return none;
-  const auto contacts = [&](int which)
-  {
-    return recorded_contacts(*model, problem.sliding.interface.directions,
-                             periods.records[static_cast<std::size_t>(which)]);
-  };
+  const auto contacts = [&](std::size_t grid)
+  { return recorded_contacts(*model, problem.sliding.interface.directions, periods[grid]); };
   ReducedMap own{*model, map.steps, map.theta, comm};
-  const auto recorded = contacts(RecordedPeriods::own);
+  const auto recorded = contacts(at_own);
   const ReducedSpectrum spectrum = large_multipliers(own, period, recorded);
   // no motion beside a cycle that shooting finds doubles in a period: shapes that do not fit friction do
   if (!spectrum.values.empty() && std::abs(spectrum.values.front()) > 2)

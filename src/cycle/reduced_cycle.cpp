@@ -86,7 +86,6 @@ PetscInt attachments_of(const ReducedSearch& search)
 /// Makes the reduced model of the active pairs, for motions up to an amplitude of the followed mode.
 void build_model(ReducedSearch& search, double amplitude)
 {
-  const double clock = MPI_Wtime();
   CycleProblem& problem = search.problem;
   // where its cycle is the answer, friction is left free
   const Interface& interface = problem.sliding.interface;
@@ -102,13 +101,11 @@ void build_model(ReducedSearch& search, double amplitude)
                                                    sliding, &search.real, problem.step.factor}));
   problem.reduced = search.made;
   describe_model(search);
-  search.fidelity.reduction_seconds += MPI_Wtime() - clock;
 }
 
 /// Free periods from a motion until one comes back to within half a percent, or its fluctuation exceeds `most`.
 Orbit run_free(ReducedSearch& search, ReducedMap& map, Vec motion, double period, double most)
 {
-  const double clock = MPI_Wtime();
   const Flow flow = flow_of(map, search.problem.sliding.structure);
   const Preconditioner none;
   Progress progress(map.comm, "reduced model, free", static_cast<double>(most_free_periods));
@@ -116,7 +113,6 @@ Orbit run_free(ReducedSearch& search, ReducedMap& map, Vec motion, double period
   const OrbitProblem problem{flow, none, zeros_like(motion), period};
   Orbit free = integrate_free_periods(problem, log, motion, period, {most_free_periods, 5e-3, 0, 2e-3, most});
   search.fidelity.reduced_periods += log.convergence.periods;
-  search.fidelity.reduced_seconds += MPI_Wtime() - clock;
   return free;
 }
 
@@ -147,7 +143,6 @@ Owned<Vec> state_in_phase(const ReducedSearch& search, ReducedMap& map, const Or
 /// Shoots from near a cycle.
 ReducedCycle shoot_at(ReducedSearch& search, ReducedMap& map, Vec from, double period)
 {
-  const double clock = MPI_Wtime();
   const Structure& structure = search.problem.sliding.structure;
   const Flow flow = flow_of(map, structure);
   if (search.correction.left.size() == 0) search.correction = monodromy_correction(map, period, on_model(search, from));
@@ -165,7 +160,6 @@ ReducedCycle shoot_at(ReducedSearch& search, ReducedMap& map, Vec from, double p
                      at_rest ? std::nan("") : found.orbit.residual};
   cycle.energy = mean_energy(map, cycle.period, on_model(search, cycle.motion));
   search.fidelity.reduced_periods += found.convergence.periods + 1;
-  search.fidelity.reduced_seconds += MPI_Wtime() - clock;
   return cycle;
 }
 

@@ -351,10 +351,6 @@ void add_fidelity(Entry whole, const Fidelity& fidelity)
                "relative error of the frequency by the step", fidelity.step_frequency_error);
   errors.check(!(fidelity.step_energy_error > most), "step_energy", "-", "relative error of that energy by the step",
                fidelity.step_energy_error);
-  const Entry seconds = out.group("seconds");
-  seconds.add("reduction", "s", "time to make the reduced model", fidelity.reduction_seconds);
-  seconds.add("reduced_cycles", "s", "time on the reduced model", fidelity.reduced_seconds);
-  seconds.add("full_periods", "s", "time on the full model", fidelity.full_seconds);
 }
 
 void add_attractors(Entry out, const Report& report)

@@ -1,6 +1,7 @@
 #include "squeal/settled/motion.hpp"
 
 #include "squeal/base/progress.hpp"
+#include "squeal/base/statistics.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +13,7 @@ namespace
 {
 
 /// The verdict where two exponents are zero: a torus, or a motion that winds down to a cycle.
-MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencies& base)
+MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencies& base, double wanders)
 {
   const MeanValue decay = decay_of_spread(energies);
   const double length = static_cast<double>(energies.size());
@@ -24,7 +25,7 @@ MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencie
   constexpr double width = 4; // of a line under the Hann window, points of the spectrum
   if (std::abs(base.second - std::round(base.second / base.first) * base.first) * length < width * base.first)
     return {MotionKind::undecided, "quasi-periodic and a cycle", "the lines are not apart: more periods would decide"};
-  if (base.explained < 0.8)
+  if (base.explained < 0.8 && !(wanders < 0.1)) // NaN does not tell
     return {MotionKind::undecided, "quasi-periodic and weakly irregular",
             format("%.0f %% of the side bands are at combinations of two frequencies: more periods would decide",
                    100 * base.explained)};
@@ -54,13 +55,9 @@ MotionVerdict judge_irregular(std::span<const double> energies)
 /// which are as many as q^2.
 bool steady(std::span<const double> energies, int rounds)
 {
-  double sum = 0, squares = 0;
-  for (const double energy : energies) sum += energy;
-  const double middle = sum / static_cast<double>(energies.size());
-  for (const double energy : energies) squares += (energy - middle) * (energy - middle);
   const MeanValue decay = decay_of_spread(energies);
   const double within = 1e-3 / std::pow(std::max(rounds, 1), 2);
-  return std::sqrt(squares / static_cast<double>(energies.size())) < within * middle && decay.value + decay.error >= 0;
+  return standard_deviation(energies) < within * mean(energies) && decay.value + decay.error >= 0;
 }
 
 /// Whether the two largest exponents are apart by their bars: a wide bar holds zero and much else.
@@ -169,7 +166,9 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
       (zero > 0 && steady(energies, base.closes_after) && one_frequency))
     return {MotionKind::periodic, "", ""};
   if (zero == 1) return {MotionKind::undecided, "a cycle and an irregular motion: the exponents' bars overlap", more};
-  if (zero == 2) return judge_torus(energies, base);
+  const double wanders = wandering(energies);
+  if (zero > 1 && wanders > 0.8) return judge_irregular(energies);
+  if (zero == 2) return judge_torus(energies, base, wanders);
   if (zero == 0) return {MotionKind::undecided, "a cycle and rest: no exponent is zero within its bar", more};
   return {MotionKind::undecided, "quasi-periodic with more than two frequencies and weakly irregular",
           format("%ld exponents are zero within their bars: ", static_cast<long>(zero)) + more};

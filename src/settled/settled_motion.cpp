@@ -213,14 +213,6 @@ void note_undecided(SettledMotion& motion)
     motion.outcome.reason = "undecided between " + verdict.between + ": " + verdict.would_decide;
 }
 
-/// The frequency of the line nearest to another one; that one where there is none.
-double nearest_line(const Spectrum& spectrum, double frequency)
-{
-  const auto nearest = std::ranges::min_element(
-      spectrum.lines, {}, [&](const Line& line) { return std::abs(line.frequency_hz - frequency); });
-  return nearest == spectrum.lines.end() ? frequency : nearest->frequency_hz;
-}
-
 /// Sets what half as many steps a period change from where the motion ends. These are the mean fluctuating energy and,
 /// as part of their bars, the frequencies of lines. Seen is the second half of as many windows as cost a quarter of the
 /// motion's own.
@@ -242,7 +234,8 @@ void add_step_errors(const Windows& windows, Vec end, SettledMotion& motion)
   motion.step_error = std::abs(batch_mean(energies).value - motion.fluctuating_energy.value);
   const double first = motion.examined.base.first;
   const Spectrum spectrum = spectrum_of(followed_series(history, motion.examined.followed), step);
-  const double part = std::abs(nearest_line(spectrum, first) / first - 1);
+  double part = HUGE_VAL; // to the nearest line
+  for (const Line& line : spectrum.lines) part = std::min(part, std::abs(line.frequency_hz / first - 1));
   for (Line& line : motion.examined.spectrum.lines)
     if (std::isfinite(part)) line.frequency_error += part * line.frequency_hz;
 }

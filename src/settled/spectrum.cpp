@@ -134,9 +134,6 @@ double period_of(const BaseFrequencies& base)
   return std::max(base.closes_after, 1) / base.first;
 }
 
-namespace
-{
-
 double standard_deviation(std::span<const double> values)
 {
   const double middle = mean(values);
@@ -144,6 +141,9 @@ double standard_deviation(std::span<const double> values)
   for (const double value : values) squares += (value - middle) * (value - middle);
   return std::sqrt(squares / static_cast<double>(values.size() - 1));
 }
+
+namespace
+{
 
 /// The values of each of `count` batches of equal length; what is left over at the start is left out.
 std::vector<std::span<const double>> batches_of(std::span<const double> series, std::size_t count)
@@ -218,6 +218,32 @@ double correlation_time(std::span<const double> series)
   for (std::size_t lag = 1; lag < series.size() && static_cast<double>(lag) <= window * time; ++lag)
     time += 2 * covariance(lag) / variance;
   return std::max(time, 1.);
+}
+
+double wandering(std::span<const double> series)
+{
+  constexpr int turns = 64, fewest = 192;
+  constexpr double least = 0.05; // of the mean: contact within steps scatters a regular motion by less
+  const int size = to_int(series.size()), longest = size / 10;
+  const double middle = mean(series);
+  if (size < fewest || standard_deviation(series) < least * middle) return std::nan("");
+  const Eigen::ArrayXd time = Eigen::ArrayXd::LinSpaced(longest, 1 - longest, longest - 1);
+  std::vector<double> found;
+  for (int k = 1; k <= turns; ++k)
+  {
+    const double turn = std::numbers::pi / 5 * (1 + 3 * std::fmod(k * std::numbers::phi, 1));
+    Eigen::ArrayXcd places(size);
+    std::complex<double> place = 0;
+    for (int i = 0; i < size; ++i)
+      places(i) = place += std::polar(1., turn * i) * (series[static_cast<std::size_t>(i)] - middle);
+    Eigen::ArrayXd moved(longest);
+    for (int n = 1; n <= longest; ++n)
+      moved(n - 1) = (places.segment(n, size - longest) - places.head(size - longest)).abs2().sum();
+    moved -= moved.mean();
+    found.push_back((moved * time).sum() / std::sqrt(moved.square().sum() * time.square().sum()));
+  }
+  std::ranges::nth_element(found, found.begin() + turns / 2);
+  return found[turns / 2];
 }
 
 std::size_t values_before_stationary(std::span<const double> series)

@@ -53,7 +53,6 @@ struct Fidelity
   /// Errors of the model: the change by all further corrections. NaN: not known.
   double frequency_error = std::numeric_limits<double>::quiet_NaN(), energy_error = frequency_error;
   double step_frequency_error = frequency_error, step_energy_error = frequency_error; // of the step size
-  double reduction_seconds = 0, reduced_seconds = 0, full_seconds = 0;
 };
 
 /// A cycle and how it was found.
