@@ -215,6 +215,25 @@ TEST_CASE("an exponent that is zero within a wide bar makes no cycle of a motion
   CHECK(judge_motion(narrow, energies, base).kind == MotionKind::periodic);
 }
 
+TEST_CASE("energies of a broad spectrum are told from those of lines: zero exponents are then an irregular motion's")
+{
+  std::mt19937 random(5);
+  const auto lines = sampled(400, [](double i)
+                             { return 2 + std::sin(0.83 * i) + 0.6 * std::cos(2.17 * i) + 0.4 * std::sin(1.39 * i); });
+  std::vector<double> noise = noise_with_memory(random, 0.3);
+  for (double& value : noise) value = 2 + 0.3 * value;
+  const auto torus = sampled(400, [](double i) { return 2 + std::sin(0.83 * i) + 0.3 * std::cos(1.66 * i); });
+  CHECK(wandering(torus) < 0.1);
+  CHECK(wandering(lines) < 0.3); // angles near a line's own take longer
+  CHECK(wandering(noise) > 0.8);
+  CHECK(std::isnan(wandering(std::span(lines).first(190))));
+  const std::vector<MeanValue> three_zeros{{0.014, 0.031}, {0.002, 0.02}, {-0.006, 0.017}, {-1, 0.1}};
+  CHECK(judge_motion(three_zeros, noise, {1, 0.37, 0, 0.3}).kind == MotionKind::irregular);
+  CHECK(judge_motion(three_zeros, lines, {1, 0.37, 0, 0.3}).kind == MotionKind::undecided);
+  const std::vector<MeanValue> two_zeros{{1e-3, 1e-2}, {-1e-3, 1e-2}, {-0.3, 0.1}};
+  CHECK(judge_motion(two_zeros, torus, {1, 0.37, 0, 0.3}).kind == MotionKind::quasi_periodic);
+}
+
 TEST_CASE("a drift is not stationary, a beat is; what comes before the motion has settled is left out")
 {
   std::mt19937 random(3);
