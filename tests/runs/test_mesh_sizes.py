@@ -12,8 +12,8 @@ from conftest import INPUTS, ROOT
 from mesh_cases import BAR, BAR_SCENE, ELEMENTS
 
 sys.path.insert(0, str(ROOT / "tools"))
-from squeal import Results  # noqa: E402
-from squeal.mesh_estimate import blocks_of, estimate, mode_vectors, scene_of  # noqa: E402
+from squeal import Results, surface  # noqa: E402
+from squeal.mesh_estimate import blocks_of, chords, estimate, mode_vectors, scene_of  # noqa: E402
 from squeal.mesh_sizes import factors_for, present_sizes, wanted_factors, write_sizes  # noqa: E402
 
 LAM = complex(-1e-6 / 2 * (2 * math.pi * 250)**2, 2 * math.pi * 250)  # of the first mode, exactly
@@ -109,6 +109,40 @@ def test_the_tool_writes_what_paraview_reads(squeal, tmp_path):
     text = (run.folder / "mesh_error.xdmf").read_text()
     assert "mesh_error.h5:/modes/1/growth" in text and f'NumberOfElements="{len(growth)}"' in text
     assert (run.folder / "mesh_error.png").stat().st_size > 5000
+
+
+def ring(sides, quadratic):
+    """A block round an axis with this many flat sides, of 8- or 20-node bricks: elements and nodes. quadratic: mid-side nodes are on the circles."""
+    number, solids = {}, []
+    for k in range(sides):
+        corners = [np.array([r, j, z]) for z in (0, 1) for r, j in ((1, k), (2, k), (2, k + 1), (1, k + 1))]
+        places = corners + [(corners[a] + corners[b]) / 2 for a, b in (surface.HEX_EDGES if quadratic else ())]
+        solids.append((48 if quadratic else 9, [number.setdefault((r, j % sides, z), len(number)) for r, j, z in places]))
+    angle = 2 * math.pi / sides
+    return solids, np.array([(r * math.cos(j * angle), r * math.sin(j * angle), z) for r, j, z in number])
+
+
+def test_flat_sides_of_round_parts_turn():
+    """A ring of 24 bricks turns by 15 degrees at each of its sides, within and without, and by right angles at its edges; with
+    mid-side nodes on the circles no face has straight sides."""
+    turned = np.degrees(surface.turns(*ring(24, False)))
+    assert np.sum(np.abs(turned - 15) < 1e-6) == 48 and np.sum(np.abs(turned - 90) < 1e-6) == 96 and len(turned) == 48 + 96 + 48
+    assert not len(surface.turns(*ring(24, True)))
+
+
+def test_a_mesh_file_with_chords_says_that_its_bars_do_not_hold_them(squeal, tmp_path):
+    (tmp_path / "round.geo").write_text("""SetFactory("OpenCASCADE"); Cylinder(1) = {0, 0, 0, 1, 0, 0, 0.2}; MeshSize{:} = 0.1;
+Physical Volume("bar") = {1}; Physical Surface("end") = {3};
+""")
+    scene = re.sub(r'support = .*', 'support = [ { on = "end", fixed = "all" } ]', BAR_SCENE)
+    subprocess.run(["gmsh", "-3", "-o", tmp_path / "round.msh", tmp_path / "round.geo"], check=True, stdout=subprocess.DEVNULL)
+    said = {}
+    for file in ("round.msh", "round.geo"):
+        (tmp_path / "scene.toml").write_text(scene.replace("mesh.geo", file))
+        run = squeal(tmp_path / "scene.toml", "-modes_shapes", "all", ranks=1)
+        assert run.code == 0, run.errors
+        said[file] = chords(Results(run.output))
+    assert "no bar holds" in said["round.msh"] and not said["round.geo"]
 
 
 def converge(folder, *arguments):

@@ -12,7 +12,7 @@ does not turn the answer.
 A growth rate is a small part of an eigenvalue, and the phase of this sum is not sharp enough to tell its sign where it is below a tenth
 of the whole. Where the run has the modes on a finer mesh (modes.mesh_error), the parts are turned and scaled by one factor, so that
 their sum is what the shape functions leave open there, with the closed pairs held. What closed pairs that changed make of it is the
-contact's part. It is given to the elements of the slave side, by how far the pressure at their nodes is below its mean.
+contact's part. It is given to the elements of the slave side where the pressure ends.
 
 Caveats: shells, beams and springs have no part in it; a mesh that is too coarse for a mode has nothing to recover.
 """
@@ -27,11 +27,14 @@ from squeal.results import Missing, Results
 from squeal.scene import with_numbers
 from squeal.solid_elements import KINDS, TETRA4, TETRA10, Elements, elasticity, monomials
 from squeal.surface import elements as elements_of
+from squeal.surface import turns
 
+KINK = 40  # degrees: sharper edges are the part's own
 CHUNK = 512  # elements at a time
 MODES = 8  # at most so many
 STABLE = 2  # of these, those of least damping ratio
 SAFETY = 1.25  # factor of a bar's part by the shape functions, that of modes.mesh_error
+CANCELLED = 0.05  # part of the sum of the elements' moduli below which their sum is chance
 SURE = 0.1  # part of the eigenvalue's change from which on its phase is sharp enough for the growth rate
 
 
@@ -75,6 +78,17 @@ class ModeEstimate:
         """Whether the recovered strains tell the sign of the growth rate's change."""
         return not self.with_left or abs(self.change.real) > SURE * abs(self.change)
 
+    @property
+    def bars(self) -> tuple[float, float]:
+        """What the shape functions and the contact's border leave open on the growth rate [1/s]: of the finer mesh where there is one. The
+        elements' parts cancel in the first to no less than CANCELLED of them: those of the next mesh cancel otherwise."""
+        scale = SAFETY / 3 if self.refined else 1.0
+        smooth = scale * max(abs(self.of_cells.real.sum()), CANCELLED * np.abs(self.of_cells.real).sum())
+        if not self.refined:
+            return max(smooth, 1e-300), 0.0
+        contact = self.refined["growth_error"] - scale * abs(self.of_cells.real.sum())
+        return max(smooth, 1e-300), max(contact, 0.0)
+
 
 @dataclass
 class MeshEstimate:
@@ -101,6 +115,21 @@ def scene_of(run: Results) -> dict[str, Any]:
     if not file.exists():
         raise Missing(f"there is no {file}, which has the materials")
     return with_numbers(tomllib.loads(file.read_text()))
+
+
+def chords(run: Results) -> str:
+    """A sentence for a mesh file whose straight sides seem to stand for round ones: its bars do not hold what these make. Empty: none."""
+    file = str(scene_of(run).get("mesh", {}).get("file", ".geo"))
+    if file.endswith((".geo", ".geo_unrolled")):
+        return ""
+    angles = np.degrees(turns(elements_of(run.field("mesh/topology")), run.nodes))
+    round_ones = angles[(angles > 1) & (angles < KINK)]
+    if not len(round_ones):
+        return ""
+    turn = float(np.median(round_ones))
+    return (f"{len(round_ones)} sides of flat faces turn by {turn:.2g} degrees (up to {round_ones.max():.2g}), as on round parts meshed by chords: these lie "
+            f"{100 * (1 - np.cos(np.radians(turn / 2))):.1g} % of the radius within them, and no bar holds what that makes of growth rates; "
+            "a finer mesh file, or mid-side nodes on the geometry, tells it")
 
 
 def mode_vectors(run: Results) -> tuple[list[dict[str, Any]], np.ndarray, list[int]]:
@@ -249,17 +278,30 @@ def contact_elements(run: Results, blocks: list[Block], cells: int) -> np.ndarra
 
 
 def border_shares(run: Results, blocks: list[Block], cells: int) -> np.ndarray:
-    """Of each element the part of the contact's border at its nodes: how far the pressure there is below its mean; they sum to 1."""
+    """Of each element the part of the contact's border in it; they sum to 1. The border is where the pressure, as it goes on for half an
+    element, reaches zero: elements whose least pressure is below half of its fall. Where no pressure is so low, those of less than its
+    mean have it, by what they lack."""
     result = np.zeros(cells)
     try:
         nodes, pressure, area = (run.field(f"pairs/{name}") for name in ("node", "pressure", "area"))
     except Missing:
         return result
-    at_nodes = np.zeros(len(run.nodes))
+    at_nodes = np.full(len(run.nodes), np.nan)
     mean = (pressure * area).sum() / max(area.sum(), 1e-300)
-    at_nodes[nodes] = np.maximum(1 - pressure / max(mean, 1e-300), 0)
+    at_nodes[nodes] = pressure / max(mean, 1e-300)
+    lacking = np.zeros(cells)
     for block in blocks:
-        result[block.cells] = at_nodes[block.nodes].mean(axis=1)
+        own = at_nodes[block.nodes]
+        there = np.isfinite(own)
+        least = np.where(there, own, np.inf).min(axis=1)
+        most = np.where(there, own, -np.inf).max(axis=1)
+        count = there.sum(axis=1)
+        has_face = count >= 3
+        crossed = has_face & (most > 0) & (3 * least < most)
+        result[block.cells] = np.where(crossed, 1.0, 0)
+        lacking[block.cells] = np.where(there, np.maximum(1 - own, 0), 0).sum(axis=1)
+    if not result.any():
+        result = lacking
     return result / max(result.sum(), 1e-300)
 
 

@@ -1,9 +1,10 @@
 """Sizes of elements that an estimate of the mesh's error asks for, as a file of views that gmsh takes as its background.
 
 The mesh of fewest elements for a given error has equal parts of it in all elements (Ladeveze et al. 1991). Where an element's part
-eta goes as h^q in its volume, q twice the order of the shape functions, a factor r on its size leaves eta r^q, and 1/r^3 elements:
+eta goes as h^q in its volume, q twice the order of the shape functions, a factor r on its size leaves eta r^q, and 1/r^3 elements.
+The border of the contact falls between nodes, and its part c goes as h. Both together tell how what may be left is shared by the two:
 
-    r = (share / eta)^(1/(q + 3)),   sum of eta r^q = what may be left
+    q eta r^(q + 3) + c r^4 = share,   sum of eta r^q + c r = what may be left
 """
 
 from pathlib import Path
@@ -63,18 +64,26 @@ def present_sizes(block: Block) -> np.ndarray:
     return np.linalg.norm(places[:, ends[:, 0]] - places[:, ends[:, 1]], axis=2).mean(axis=1)
 
 
-def factors_for(eta: np.ndarray, q: np.ndarray, left: float) -> np.ndarray:
-    """The rule above: factors on the sizes of elements with the parts eta, that leave this part of their sum."""
-    eta = np.maximum(eta, 1e-12 * eta.max())
+def factors_for(eta: np.ndarray, q: np.ndarray, left: float, border: np.ndarray | float = 0.0) -> np.ndarray:
+    """The rule above: factors on the sizes of elements with the parts eta and those of the border, that leave this part of their sum."""
+    border = np.broadcast_to(border, eta.shape)
+    wanted = max(left * (eta.sum() + border.sum()), left * eta.sum() + FINEST * border.sum())  # a step takes no more from the border
 
-    def factors(log_share: float) -> np.ndarray:
-        return np.clip(np.exp((log_share - np.log(eta)) / (q + 3)), FINEST, COARSEST)
+    def factors(share: float) -> np.ndarray:
+        low, high = (np.full(len(eta), np.log(end)) for end in (FINEST, COARSEST))
+        for _ in range(45):
+            middle = (low + high) / 2
+            much = q * eta * np.exp((q + 3) * middle) + border * np.exp(4 * middle) > share
+            low, high = np.where(much, low, middle), np.where(much, middle, high)
+        return np.exp(low)
 
-    low, high = np.log(eta.min()) + 12 * np.log(FINEST), np.log(eta.max()) + 12 * np.log(COARSEST)
-    for _ in range(80):
+    largest = (q * eta + border).max()
+    low, high = np.log(largest) - 40, np.log(largest) + 12 * np.log(COARSEST)
+    for _ in range(60):
         middle = (low + high) / 2
-        low, high = (low, middle) if (eta * factors(middle)**q).sum() > left * eta.sum() else (middle, high)
-    return factors(low)
+        r = factors(np.exp(middle))
+        low, high = (low, middle) if (eta * r**q + border * r).sum() > wanted else (middle, high)
+    return factors(np.exp(low))
 
 
 def wanted_factors(found: MeshEstimate, left: dict[int, float]) -> list[np.ndarray]:
@@ -82,10 +91,12 @@ def wanted_factors(found: MeshEstimate, left: dict[int, float]) -> list[np.ndarr
     error that may stay."""
     q = np.concatenate([np.full(len(block.cells), 2.0 * KINDS[block.code].order) for block in found.blocks])
     cells = np.concatenate([block.cells for block in found.blocks])
-    modes = [mode for mode in found.modes if mode.number in left]
-    asked = [factors_for(np.abs(mode.of_cells[cells]), q, left[mode.number]) for mode in modes]
-    # the border of the contact falls between nodes: the first order
-    asked += [factors_for(np.abs(mode.of_contact[cells]), np.ones(len(cells)), left[mode.number]) for mode in modes if mode.of_contact.any()]
+    asked = []
+    for mode in found.modes:
+        if mode.number in left:
+            eta, border = np.abs(mode.of_cells[cells]), np.abs(mode.of_contact[cells])
+            smooth, contact = mode.bars
+            asked.append(factors_for(eta * (smooth / eta.sum()), q, left[mode.number], border * (contact / max(border.sum(), 1e-300))))
     if not asked:
         raise SquealError("no mode says what the sizes are to be for")
     return np.split(np.min(asked, axis=0), np.cumsum([len(block.cells) for block in found.blocks])[:-1])
@@ -150,7 +161,6 @@ def left_open(found: MeshEstimate, part: float) -> dict[int, float]:
     asked = [mode for mode in found.modes if mode.lam.real > 0] or found.modes[:1]
     result = {}
     for mode in asked:
-        bar = mode.refined["growth_error"] if mode.refined else abs(mode.change.real)
         growth = abs(mode.refined["corrected_growth_rate"] if mode.refined else mode.lam.real)
-        result[mode.number] = part * growth / bar if bar > 0 else np.inf
+        result[mode.number] = part * growth / sum(mode.bars)
     return result

@@ -92,6 +92,26 @@ def volume(elements, nodes, thickness):
     return total
 
 
+def turns(elements, nodes):
+    """Angles [rad] between the normals of flat faces of the outer surface that share a side: where round parts are meshed by chords."""
+    met, solids = {}, list(elements)
+    corners_of = {code: len({k for face in faces for k in face}) for code, (_, faces, _) in SOLIDS.items()}
+    corners = {node for code, of in solids if code in SOLIDS for node in of[: corners_of[code]]}
+    for rim in outer(solids)[0]:
+        own = [node for node in rim if node in corners]
+        places = nodes[own]
+        size = np.linalg.norm(places - places.mean(axis=0), axis=1).max()
+        if len(rim) > len(own):
+            between = nodes[[node for node in rim if node not in corners]]
+            middles = (places + np.roll(places, -1, axis=0)) / 2
+            if min(np.abs(np.roll(between, shift, axis=0) - middles).max() for shift in (0, 1)) > 1e-4 * size:
+                continue
+        normal = np.cross(places[1] - places[0], places[2] - places[0])
+        for a, b in zip(own, (*own[1:], own[0])):
+            met.setdefault(frozenset((a, b)), []).append(normal / np.linalg.norm(normal))
+    return np.array([np.arctan2(np.linalg.norm(np.cross(*pair)), np.dot(*pair)) for pair in met.values() if len(pair) == 2])
+
+
 def triangles(polygon):
     """A polygon of points (n, 3) as triangles about its centre: (n, 3, 3)."""
     following = np.roll(polygon, -1, axis=0)
