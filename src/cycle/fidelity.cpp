@@ -32,30 +32,27 @@ struct CycleAtSteps
   double period = 0, energy = 0; // [s], [J]
 };
 
-/// The relative error of the last cycle's quantity, from its change since each of the others. Errors of order 2 depend
-/// on where in their steps pairs stick and open: their spread counts. Impacts have errors of order 1. What order 2
-/// makes of the last change is then more than before, or many cycles are needed.
+/// The relative error of the last cycle's quantity, from its change since each of the others. Errors of order 2 fall
+/// alike, or depend on where in their steps pairs stick and open, so that the largest counts. Impacts have errors of
+/// order 1, which the last two changes show.
 double step_error(const std::vector<CycleAtSteps>& cycles, double CycleAtSteps::*quantity)
 {
-  constexpr double of_spread = 2, more = 1.3;
-  constexpr std::size_t many = 5;
+  constexpr double alike = 1.5;
   const CycleAtSteps& last = cycles.back();
-  const std::size_t count = cycles.size() - 1;
-  double first = 0, before = 0, now = 0, squares = 0;
-  for (const CycleAtSteps& other : std::span(cycles).first(count))
+  double first = HUGE_VAL, least = HUGE_VAL, most = 0;
+  for (const CycleAtSteps& other : std::span(cycles).first(cycles.size() - 1))
   {
     const double change = std::abs(other.*quantity / (last.*quantity) - 1),
-                 ratio = static_cast<double>(other.steps) / last.steps;
-    if (&cycles.back() - &other <= 2) first = std::max(first, change * ratio / std::abs(1 - ratio));
-    before = std::max(before, now);
-    now = change * ratio * ratio / std::abs(1 - ratio * ratio);
-    squares += now * now;
+                 ratio = static_cast<double>(other.steps) / last.steps,
+                 second = change * ratio * ratio / std::abs(1 - ratio * ratio);
+    if (&cycles.back() - &other <= 2) first = std::min(first, change * ratio / std::abs(1 - ratio));
+    least = std::min(least, second);
+    most = std::max(most, second);
   }
-  const double second = of_spread * std::sqrt(squares / static_cast<double>(count));
-  return now > more * before || cycles.size() > many ? std::max(first, second) : second;
+  return cycles.size() > 3 && most <= alike * least ? alike * most : std::max(first, most);
 }
 
-/// Errors of the last of two cycles, of first order, or of the last of more, of the order that they show.
+/// Errors of the last of two cycles, of first order, or of the last of more, of the order that all of them show.
 RelativeChange step_errors_of(const std::vector<CycleAtSteps>& cycles)
 {
   return {step_error(cycles, &CycleAtSteps::period), step_error(cycles, &CycleAtSteps::energy)};

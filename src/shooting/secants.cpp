@@ -262,8 +262,7 @@ bool meets_target(const OrbitProblem& problem, Multisecant& multisecant, const O
   if (!(problem.target_error > 0)) return false;
   const RelativeChange now = change_by(problem, orbit, step), before = std::exchange(multisecant.last_step, now);
   const double of_before = multisecant.exact ? 0.05 : 0.5; // exact steps leave far less than they change
-  remaining = {std::max(2 * now.frequency, of_before * before.frequency),
-               std::max(2 * now.energy, of_before * before.energy)};
+  remaining = {std::max(2 * now.frequency, of_before * before.frequency), std::max(2 * now.energy, before.energy / 2)};
   return std::max(remaining.frequency, remaining.energy) <= problem.target_error;
 }
 
