@@ -85,9 +85,9 @@ UnstableModes modes_sought(const MotionSearch& search)
   return {followed_modes(point, search.scene), point.estimates};
 }
 
-/// The start of the search for a cycle: the settled motion, the checkpoint's orbit, the scene's state (a file or the
-/// transient's end). Where modes only diverge, it is a state beside the equilibrium. Else the unstable modes at their
-/// estimates' amplitudes; nothing where contact limits none.
+/// The start of the search for a cycle, the first that there is: the settled motion, the checkpoint's orbit, the
+/// scene's state (a file or the transient's end), a state beside the equilibrium where modes only diverge. Else the
+/// unstable modes at their estimates' amplitudes; nothing where contact limits none.
 std::optional<GivenStart> cycle_start(const MotionSearch& search, const CycleSettings& settings)
 {
   const auto copied = [](const GivenStart& known) {
@@ -339,9 +339,9 @@ bool is_open(const Motion& motion)
 
 constexpr int finest = 1024; // steps a period
 
-/// Whether more steps a period may change the answer. With "auto" alone they may, where a settled motion is affordable.
-/// It ends when a motion without a cycle does as it did at the steps before. The grid of time alone can make a motion
-/// of impacts wander; it then diverges by the step, not by the period.
+/// Whether more steps a period may change the answer. They may where "auto" chooses them and a settled motion is
+/// affordable. The search ends when a motion without a cycle does as it did at the steps before. The grid of time alone
+/// can make a motion of impacts wander; it then diverges by the step, not by the period.
 bool steps_may_decide(const MotionSearch& search)
 {
   constexpr double of_settling = 512; // periods

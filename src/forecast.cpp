@@ -1,6 +1,6 @@
-/// Memory is what each stage holds at its peak. It begins with the system's own count after the model is made. Copies
-/// of matrices, factors by their symbolic analysis, dense operators and vectors follow. Time is that of two pieces of
-/// work that runs repeat. A factor takes it by its operations, a step by the memory that it reads (src/README.md,
+/// Memory is what each stage holds at its peak. To the system's own count after the model is made it adds copies of
+/// matrices, factors by their symbolic analysis, dense operators and vectors. Time is that of two pieces of work that
+/// runs repeat. A factor takes it by its operations, a step by the memory that it reads (src/README.md,
 /// section 8.9).
 #include "squeal/forecast.hpp"
 

@@ -6,9 +6,9 @@
 /// opens or closes. So the finer mesh has it twice: lambda(h/2), and held with the closed pairs of the scene's mesh.
 /// With d = held - lambda(h) the limit is lambda(h/2) + d/(2^q - 1). The order q is not known: at corners and edges of
 /// contact it is below that of the elements, 2 or 4. Orders from 1 on put the limit between lambda(h/2) and lambda(h/2)
-/// + d; the middle is the corrected value. Its bar is 1.25 |d|/2 and |lambda(h/2) - held|. The border of the contact
-/// falls between nodes as it may, on the finer mesh as on the first. Straight sides of a geometry's round
-/// parts become rounder with the first division, so that they are part of d.
+/// + d; the middle is the corrected value. Its bar is 1.25 |d|/2 + |lambda(h/2) - held|. The second term is there since
+/// the border of the contact falls between nodes as it may, on either mesh. Straight sides of a geometry's round parts
+/// become rounder with the first division, so that they are part of d.
 ///
 /// Caveat: a mesh that is too coarse has no order yet. A mesh file, or a mesh that mesh.refine divided, keeps its
 /// straight sides.

@@ -88,8 +88,8 @@ bool holds(const ReducedModel& model, const std::vector<PairHistory>& pairs, con
   return true;
 }
 
-/// The recorded periods of a cycle: its own, one with the grid of time moved by half a step, one of other steps.
-/// That of other steps may be empty.
+/// The recorded periods of a cycle: its own, one on a grid moved by half a step, one of other steps, which may be
+/// empty.
 constexpr std::size_t at_own = 0, at_moved = 1, at_other = 2;
 using RecordedPeriods = std::array<std::vector<StepRecord>, 3>;
 

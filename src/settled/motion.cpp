@@ -38,8 +38,8 @@ MotionVerdict judge_torus(std::span<const double> energies, const BaseFrequencie
                  decay.error, 3 / std::max({decay.value, decay.error, 1e-6}))};
 }
 
-/// The verdict where an exponent is above zero. A mean's bar comes from batches; a series shorter than some 50
-/// correlation times has no independent ones (Sokal 1997).
+/// The verdict where an exponent is above zero, or several are zero and energies have a broad spectrum. A mean's bar
+/// comes from batches; a series shorter than some 50 correlation times has no independent ones (Sokal 1997).
 MotionVerdict judge_irregular(std::span<const double> energies)
 {
   constexpr double enough = 50; // correlation times
@@ -166,10 +166,10 @@ MotionVerdict judge_motion(const std::vector<MeanValue>& exponents, std::span<co
       (zero > 0 && steady(energies, base.closes_after) && one_frequency))
     return {MotionKind::periodic, "", ""};
   if (zero == 1) return {MotionKind::undecided, "a cycle and an irregular motion: the exponents' bars overlap", more};
-  const double wanders = wandering(energies);
-  if (zero > 1 && wanders > 0.8) return judge_irregular(energies);
-  if (zero == 2) return judge_torus(energies, base, wanders);
   if (zero == 0) return {MotionKind::undecided, "a cycle and rest: no exponent is zero within its bar", more};
+  const double wanders = wandering(energies);
+  if (wanders > 0.8) return judge_irregular(energies);
+  if (zero == 2) return judge_torus(energies, base, wanders);
   return {MotionKind::undecided, "quasi-periodic with more than two frequencies and weakly irregular",
           format("%ld exponents are zero within their bars: ", static_cast<long>(zero)) + more};
 }

@@ -240,9 +240,8 @@ void add_step_errors(const Windows& windows, Vec end, SettledMotion& motion)
     if (std::isfinite(part)) line.frequency_error += part * line.frequency_hz;
 }
 
-/// The largest exponent with four times as many steps a period, from where the motion ends. Its windows cost a quarter
-/// of what the motion did, or are 32. Its first quarter is left out, where the tangent turns to what grows
-/// most.
+/// The largest exponent with four times as many steps a period, from where the motion ends. Its windows, at least 32,
+/// cost a quarter of what the motion did. The first quarter is left out, where the tangent turns to what grows most.
 MeanValue exponent_by_finer_steps(const Windows& windows, const SettledMotion& motion, Vec end)
 {
   constexpr int finer = 4;
@@ -263,7 +262,8 @@ MeanValue exponent_by_finer_steps(const Windows& windows, const SettledMotion& m
 }
 
 /// An exponent above zero comes from the grid of time where four times as many steps change it beyond both bars and a
-/// tenth. Masses that contact hits within steps, or feet without mass, scatter a regular motion.
+/// tenth. Masses that contact hits within steps, or feet without mass, scatter a regular motion. Exponents of zero
+/// beside a broad spectrum of energies always pass.
 void hold_against_finer_steps(const Windows& windows, Vec end, SettledMotion& motion)
 {
   if (motion.examined.verdict.kind != MotionKind::irregular) return;

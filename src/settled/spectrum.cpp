@@ -134,14 +134,6 @@ double period_of(const BaseFrequencies& base)
   return std::max(base.closes_after, 1) / base.first;
 }
 
-double standard_deviation(std::span<const double> values)
-{
-  const double middle = mean(values);
-  double squares = 0;
-  for (const double value : values) squares += (value - middle) * (value - middle);
-  return std::sqrt(squares / static_cast<double>(values.size() - 1));
-}
-
 namespace
 {
 

@@ -150,8 +150,8 @@ bool repels(const Passes& passes)
   return is_above(passes, passes.bars);
 }
 
-/// The pairs that decide: the largest, and those whose bars reach across 1. One above 1 by more than the grid of time
-/// may change leaves the latter out. That one may decide `alone`, once it has settled.
+/// The pairs that decide: the largest, and those whose bars reach across 1. The latter are left out where one is above
+/// 1 beyond its bar or, with `alone`, by more than the grid of time changes.
 std::vector<std::size_t> deciding_pairs(const Passes& passes, bool alone)
 {
   const bool may_decide = alone ? is_above(passes, passes.grid) : repels(passes);

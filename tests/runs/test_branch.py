@@ -113,7 +113,7 @@ def test_ranks_agree_on_a_branch_of_a_mesh(brake, module_run):
     assert [kind for kind, *_ in events(brake)] == [kind for kind, *_ in events(other)] == ["grazing"]
     for (_, first, error), (_, second, other_error) in zip(events(brake), events(other)):
         # Halves of the intervals that are left. A pair that grazes between two steps is seen or not by the phase of the grid,
-        # so that roundings of other processors may leave a bisection by another half.
+        # so that a bisection may go on with the other half where processors round otherwise.
         assert abs(first - second) <= 3 * (error + other_error)
     for first, second in zip(brake["branch"]["points"], other["branch"]["points"], strict=True):
         # the step is off by 3.5e-3 of the period, and the phase of its grid against the events moves a twentieth of that

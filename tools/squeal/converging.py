@@ -15,7 +15,7 @@ from squeal.mesh_estimate import MeshEstimate, estimate
 from squeal.mesh_sizes import elements_foreseen, left_open, wanted_factors, write_sizes
 from squeal.results import Missing, Results
 from squeal.runs import environment, run
-from squeal.scene import Scene
+from squeal.scene import Scene, is_geometry
 
 STUDIES = ("transient", "cycle", "branch", "sweep", "response", "robustness", "uncertain", "change", "initial")
 STEPS = 12  # at most
@@ -125,7 +125,7 @@ class Converging:
 
     def takes_sizes(self, found: MeshEstimate) -> bool:
         """Whether the geometry's mesh changes with its sizes."""
-        if self.scene["mesh"].get("refine", 0) or not str(self.scene["mesh"]["file"]).endswith((".geo", ".geo_unrolled")):
+        if self.scene["mesh"].get("refine", 0) or not is_geometry(self.scene["mesh"]["file"]):
             return False
         file = self.output / "half.pos"
         write_sizes(file, found, [np.full(len(block.cells), 0.5) for block in found.blocks], self.scene["mesh"].get("scale", 1), "")

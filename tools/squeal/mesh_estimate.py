@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 from squeal.results import Missing, Results
-from squeal.scene import with_numbers
+from squeal.scene import is_geometry, with_numbers
 from squeal.solid_elements import KINDS, TETRA4, TETRA10, Elements, elasticity, monomials
 from squeal.surface import elements as elements_of
 from squeal.surface import turns
@@ -83,11 +83,9 @@ class ModeEstimate:
         """What the shape functions and the contact's border leave open on the growth rate [1/s]: of the finer mesh where there is one. The
         elements' parts cancel in the first to no less than CANCELLED of them: those of the next mesh cancel otherwise."""
         scale = SAFETY / 3 if self.refined else 1.0
-        smooth = scale * max(abs(self.of_cells.real.sum()), CANCELLED * np.abs(self.of_cells.real).sum())
-        if not self.refined:
-            return max(smooth, 1e-300), 0.0
-        contact = self.refined["growth_error"] - scale * abs(self.of_cells.real.sum())
-        return max(smooth, 1e-300), max(contact, 0.0)
+        together = scale * abs(self.of_cells.real.sum())
+        smooth = max(together, scale * CANCELLED * np.abs(self.of_cells.real).sum(), 1e-300)
+        return smooth, max(self.refined["growth_error"] - together, 0.0) if self.refined else 0.0
 
 
 @dataclass
@@ -119,8 +117,8 @@ def scene_of(run: Results) -> dict[str, Any]:
 
 def chords(run: Results) -> str:
     """A sentence for a mesh file whose straight sides seem to stand for round ones: its bars do not hold what these make. Empty: none."""
-    file = str(scene_of(run).get("mesh", {}).get("file", ".geo"))
-    if file.endswith((".geo", ".geo_unrolled")):
+    file = scene_of(run).get("mesh", {}).get("file")
+    if file is None or is_geometry(file):
         return ""
     angles = np.degrees(turns(elements_of(run.field("mesh/topology")), run.nodes))
     round_ones = angles[(angles > 1) & (angles < KINK)]
@@ -295,10 +293,7 @@ def border_shares(run: Results, blocks: list[Block], cells: int) -> np.ndarray:
         there = np.isfinite(own)
         least = np.where(there, own, np.inf).min(axis=1)
         most = np.where(there, own, -np.inf).max(axis=1)
-        count = there.sum(axis=1)
-        has_face = count >= 3
-        crossed = has_face & (most > 0) & (3 * least < most)
-        result[block.cells] = np.where(crossed, 1.0, 0)
+        result[block.cells] = (there.sum(axis=1) >= 3) & (most > 0) & (3 * least < most)
         lacking[block.cells] = np.where(there, np.maximum(1 - own, 0), 0).sum(axis=1)
     if not result.any():
         result = lacking

@@ -156,8 +156,8 @@ def elements_foreseen(factors: list[np.ndarray]) -> float:
 
 
 def left_open(found: MeshEstimate, part: float) -> dict[int, float]:
-    """Of each unstable mode, or of the first one, the part of its error that may stay, such that the bar is this part of its growth
-    rate: the bar of the finer mesh where the run has one, else what is estimated."""
+    """The part of its error that may stay, of each unstable mode or of the first one, such that its bars (ModeEstimate.bars) together are
+    this part of its growth rate. They exceed the printed bar where elements' parts cancel."""
     asked = [mode for mode in found.modes if mode.lam.real > 0] or found.modes[:1]
     result = {}
     for mode in asked:

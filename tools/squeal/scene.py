@@ -17,6 +17,11 @@ ENDS = ("from", "to")  # names of bodies in tables that join some, numbers in ot
 JOINING = ("spring", "connector", "beam")
 
 
+def is_geometry(file: str) -> bool:
+    """Whether gmsh meshes this file of a scene's [mesh], which is then no mesh itself."""
+    return str(file).endswith((".geo", ".geo_unrolled"))
+
+
 def with_numbers(scene: dict[str, Any]) -> dict[str, Any]:
     """A scene in which its [numbers] stand in place of their names."""
     numbers = scene.get("numbers", {})

@@ -1,5 +1,6 @@
 #pragma once
-/// Random numbers that are the same on every machine, and means.
+/// Random numbers that are the same on every machine, means and deviations.
+#include <cmath>
 #include <cstdint>
 #include <numeric>
 #include <random>
@@ -26,6 +27,15 @@ constexpr std::uint64_t splitmix64(std::uint64_t number)
 template <class List> double mean(const List& values)
 {
   return std::accumulate(values.begin(), values.end(), 0.) / static_cast<double>(values.size());
+}
+
+/// The standard deviation of a sample of at least two numbers, by one less than their count. Not collective.
+template <class List> double standard_deviation(const List& values)
+{
+  const double middle = mean(values);
+  double squares = 0;
+  for (const double value : values) squares += (value - middle) * (value - middle);
+  return std::sqrt(squares / static_cast<double>(values.size() - 1));
 }
 
 } // namespace squeal

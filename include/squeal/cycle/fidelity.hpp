@@ -5,9 +5,9 @@
 /// outgrows the amplitude that its active pairs were chosen for, they are chosen again. Then it is shot at. Its cycle
 /// is the start on the full model.
 ///
-/// Of "reduced", a period of the full model gives the reduced cycle's error, a cycle at twice as many steps the step's.
-/// With "auto" what the scene gives is kept. Where it leaves the steps open, the full model's cycle is found at few,
-/// and its verdict is given there. Two further numbers of steps give the error of the step and the number that the
+/// With "reduced" a period of the full model gives the reduced cycle's error, a cycle at twice as many steps the
+/// step's. With "auto" what the scene gives is kept. Where it leaves the steps open, the full model's cycle is found at
+/// few, and its verdict is given there. Two further numbers of steps give the error of the step and the number that the
 /// accuracy needs. The start is the estimate on the full model where the reduced model would not be small or has no
 /// cycle. So it is where several modes are unstable. The reduced model decides how soon this ends, not where.
 #include "squeal/cycle/limit_cycle.hpp"

@@ -8,7 +8,7 @@
 namespace squeal
 {
 
-/// A recording tells the error of another: its steps a period, and the part of a change on it that is the error.
+/// A second recording, by whose change the first one's error is told: its steps a period, and the part of the change.
 struct OtherSteps
 {
   int steps = 0; // 0: none is made

@@ -23,9 +23,6 @@ struct MeanValue
 /// Means of successive windows of so many samples, a broken number: over another period than its own a cycle beats.
 std::vector<double> means_over(const std::vector<double>& samples, double length);
 
-/// Of two values and more.
-double standard_deviation(std::span<const double> values);
-
 /// The mean, its bar by means of 8, 16 and 32 batches: the widest of the three. Neighbouring values may depend on each
 /// other over less than a batch. Of fewer than 16 values 4 batches; of fewer than 4 no bar (NaN).
 MeanValue batch_mean(std::span<const double> series);
@@ -39,8 +36,8 @@ bool is_stationary(std::span<const double> series);
 double correlation_time(std::span<const double> series);
 
 /// Near 1 where a series has a broad spectrum, near 0 where it has lines alone, however many. It drives a point in a
-/// plane that turns by a fixed angle a value; the mean square displacement's correlation with the time is taken, the
-/// median over angles (Gottwald, Melbourne 2004). NaN: fewer than 192 values, or they hardly vary.
+/// plane that turns by a fixed angle a value. The mean square displacement's correlation with the time is taken, and
+/// its median over angles (Gottwald, Melbourne 2004). NaN: fewer than 192 values, or they hardly vary.
 double wandering(std::span<const double> series);
 
 /// The number of values to leave out until the rest is stationary: none, an eighth, a quarter or a half. All where
